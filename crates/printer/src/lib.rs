@@ -1,1 +1,13 @@
-//! To be written.
+//! The host without I/O: everything between a G-code file and the bytes on the wire.
+//!
+//! Bytes and time are arguments: `receive(bytes, now)`, `poll(now)`. Knows nothing of ports, files, threads or clocks,
+//! so the same code runs in a browser's worker, in the native command and in tests in virtual time.
+
+pub mod clock_sync;
+pub mod config;
+pub mod error;
+pub mod heater;
+pub mod identify;
+pub mod link;
+pub mod move_queue;
+pub mod thermistor;
