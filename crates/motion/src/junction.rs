@@ -1,0 +1,127 @@
+//! One move under its limits, and the speed at which two moves may meet.
+
+use crate::{Limits, MoveRequest};
+use nalgebra::{Vector3, Vector4};
+
+/// Shorter moves (mm) are no moves: less than rounding in a file could mean.
+pub(crate) const LENGTH_MIN_MM: f64 = 1e-9;
+
+/// A move that waits in the window: what limits it, in squared speeds (mm²/s²).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entry {
+    pub(crate) tag: u32,
+    pub(crate) from: [f64; 4],
+    pub(crate) to: [f64; 4],
+    /// Change of each coordinate per mm of path.
+    pub(crate) direction: Vector4<f64>,
+    pub(crate) length: f64,
+    pub(crate) accel: f64,
+    /// Whether the head travels (otherwise the filament alone moves).
+    travels: bool,
+    junction_deviation: f64,
+    corner_extruder: f64,
+    /// The highest cruising speed, squared.
+    pub(crate) cruise_limit: f64,
+    /// How long it would take at its highest cruising speed, s: it never takes less.
+    pub(crate) nominal_time: f64,
+    /// What the acceleration can add to the squared speed over the whole length.
+    pub(crate) gain: f64,
+    /// The same with the virtual look-ahead's acceleration.
+    pub(crate) smoothed_gain: f64,
+    /// The highest squared speed at the start, as far as the moves before it decide.
+    pub(crate) start_limit: f64,
+    /// The same in the virtual look-ahead.
+    pub(crate) smoothed_start_limit: f64,
+}
+
+impl Entry {
+    /// The move under `limits`, starting from rest; `None` where nothing moves.
+    pub(crate) fn new(request: &MoveRequest, limits: &Limits) -> Option<Self> {
+        let delta = Vector4::from(request.to) - Vector4::from(request.from);
+        let travel_mm = norm(&delta.xyz());
+        let travels = travel_mm >= LENGTH_MIN_MM;
+        let length = if travels { travel_mm } else { delta.w.abs() };
+        if length < LENGTH_MIN_MM {
+            return None;
+        }
+        let mut direction = delta / length;
+        let mut velocity = request.feed.0;
+        let mut accel = f64::INFINITY;
+        if travels {
+            velocity = velocity.min(limits.max_velocity.0);
+            accel = limits.max_accel.0;
+        } else {
+            direction = Vector4::new(0.0, 0.0, 0.0, direction.w);
+        }
+        if travels && direction.z != 0.0 {
+            let path_per_z = 1.0 / direction.z.abs();
+            velocity = velocity.min(limits.max_z_velocity.0 * path_per_z);
+            accel = accel.min(limits.max_z_accel.0 * path_per_z);
+        }
+        // The filament sets the limits where it moves without x and y, and where it is pulled back.
+        let filament_leads = direction.w < 0.0 || (direction.x == 0.0 && direction.y == 0.0);
+        if direction.w != 0.0 && filament_leads {
+            let path_per_e = 1.0 / direction.w.abs();
+            velocity = velocity.min(limits.extruder.max_extrude_only_velocity.0 * path_per_e);
+            accel = accel.min(limits.extruder.max_extrude_only_accel.0 * path_per_e);
+        }
+        Some(Self {
+            tag: request.tag,
+            from: request.from,
+            to: request.to,
+            direction,
+            length,
+            accel,
+            travels,
+            junction_deviation: limits.junction_deviation_mm(),
+            corner_extruder: limits.extruder.instantaneous_corner_velocity.0,
+            cruise_limit: velocity * velocity,
+            nominal_time: length / velocity,
+            gain: 2.0 * length * accel,
+            smoothed_gain: 2.0 * length * accel.min(limits.smoothed_accel_mm_s2()),
+            start_limit: 0.0,
+            smoothed_start_limit: 0.0,
+        })
+    }
+
+    /// Sets the start limits of this move, which follows `previous` without a stop.
+    pub(crate) fn follow(&mut self, previous: &Self) {
+        let junction = self.junction_limit(previous);
+        self.start_limit = junction.min(previous.start_limit + previous.gain);
+        self.smoothed_start_limit =
+            self.start_limit.min(previous.smoothed_start_limit + previous.smoothed_gain);
+    }
+
+    /// The highest squared speed at which this move may follow `previous`, whatever their lengths allow.
+    fn junction_limit(&self, previous: &Self) -> f64 {
+        if !(self.travels && previous.travels) {
+            return 0.0;
+        }
+        let mut limit = self.cruise_limit.min(previous.cruise_limit);
+        let extrusion_jump = (self.direction.w - previous.direction.w).abs();
+        if extrusion_jump > 0.0 {
+            let speed = self.corner_extruder / extrusion_jump;
+            limit = limit.min(speed * speed);
+        }
+        // θ is the angle between the two moves, π where they go straight on.
+        let cos_theta = -self.direction.xyz().dot(&previous.direction.xyz());
+        let sin_half = (0.5 * (1.0 - cos_theta)).max(0.0).sqrt();
+        let cos_half = (0.5 * (1.0 + cos_theta)).max(0.0).sqrt();
+        let beyond_sin = 1.0 - sin_half;
+        if beyond_sin > 0.0 && cos_half > 0.0 {
+            let radius = sin_half / beyond_sin;
+            let tan_half = sin_half / cos_half;
+            for entry in [self, previous] {
+                limit = limit.min(radius * entry.junction_deviation * entry.accel);
+                // The rounding circle may touch no move beyond its middle.
+                limit = limit.min(0.25 * entry.gain * tan_half);
+            }
+        }
+        limit
+    }
+}
+
+/// Length of a vector. Not nalgebra's `norm`: this is exactly rounded the same way on every platform.
+fn norm(v: &Vector3<f64>) -> f64 {
+    (v.x * v.x + v.y * v.y + v.z * v.z).sqrt()
+}

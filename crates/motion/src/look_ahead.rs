@@ -1,0 +1,203 @@
+//! Moves in, trapezoids out: the bounded window with what may be pushed into it.
+
+use crate::junction::Entry;
+use crate::window::Window;
+use crate::{Limits, LimitsError, PlannedMove};
+use std::collections::VecDeque;
+use thiserror::Error;
+use units::{MmPerS, Seconds};
+
+/// The most moves whose speeds are still open. A window of 8 is within 0.1 % of an endless one on usual prints.
+pub const LOOK_AHEAD_MOVES_MAX: usize = 1024;
+/// The most planned moves that wait to be taken.
+pub const READY_MOVES_MAX: usize = 4 * LOOK_AHEAD_MOVES_MAX;
+/// The longest run of motion: beyond it, print time would lose its nanoseconds.
+pub const RUN_TIME_MAX: Seconds = Seconds(1e7);
+/// Moves are planned in batches: the backward pass visits the whole window.
+const BATCH_MOVES: usize = 16;
+/// Farther out (mm) no printer reaches, and single steps would drown in rounding.
+const COORDINATE_MAX_MM: f64 = 1e9;
+/// A move must start this close (mm) to where the one before it ended.
+const GAP_MAX_MM: f64 = 1e-6;
+
+/// A straight move that somebody wants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MoveRequest {
+    /// x, y, z, e in mm: where the move before it ended.
+    pub from: [f64; 4],
+    /// x, y, z, e in mm.
+    pub to: [f64; 4],
+    /// Wanted speed along the path (of the filament, where it moves alone).
+    pub feed: MmPerS,
+    /// Handed back with the planned move: the line of the file, say.
+    pub tag: u32,
+}
+
+/// Why a move was not taken. Nothing has changed then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum MoveError {
+    /// A coordinate that is not a number, or is beyond 10⁹ mm.
+    #[error("the move has a coordinate that is not a usable number")]
+    Coordinate,
+    /// A feed that is not a positive number.
+    #[error("the move has a feed that is not a positive number")]
+    Feed,
+    /// The move starts elsewhere than where the one before it ended.
+    #[error("the move does not start where the one before it ended")]
+    Gap,
+    /// The move would make the run longer than [`RUN_TIME_MAX`].
+    #[error("the move is too slow to be planned")]
+    TooLong,
+    /// [`READY_MOVES_MAX`] planned moves wait to be taken.
+    #[error("planned moves must be taken before more can be planned")]
+    Full,
+}
+
+/// Plans moves ahead. See the crate's head for the model.
+#[derive(Clone, Debug)]
+pub struct LookAhead {
+    limits: Limits,
+    window: Window,
+    ready: VecDeque<PlannedMove>,
+    /// Print time at which the last released move ends, s.
+    print_time: f64,
+    /// Where the last move taken in this run ends; moves that went nowhere leave it.
+    position: Option<[f64; 4]>,
+    /// Where the last move pushed ends, even if it was dropped.
+    pushed_position: Option<[f64; 4]>,
+    /// Moves pushed since the last backward pass.
+    unplanned: usize,
+}
+
+impl LookAhead {
+    /// An empty window. Limits should have passed [`Limits::check`]; see [`Self::set_limits`].
+    pub fn new(limits: Limits) -> Result<Self, LimitsError> {
+        limits.check()?;
+        Ok(Self {
+            limits,
+            window: Window::default(),
+            ready: VecDeque::new(),
+            print_time: 0.0,
+            position: None,
+            pushed_position: None,
+            unplanned: 0,
+        })
+    }
+
+    /// The limits of the moves that are pushed from now on. Limits that fail [`Limits::check`] change nothing.
+    pub fn set_limits(&mut self, limits: Limits) -> Result<(), LimitsError> {
+        limits.check()?;
+        self.limits = limits;
+        Ok(())
+    }
+
+    /// The limits of the moves that are pushed from now on.
+    pub const fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Starts a run of motion: print time is zero again, and the first move may start anywhere. Moves that were not
+    /// taken are forgotten.
+    pub fn begin_run(&mut self) {
+        self.window = Window::default();
+        self.ready.clear();
+        self.print_time = 0.0;
+        self.position = None;
+        self.pushed_position = None;
+        self.unplanned = 0;
+    }
+
+    /// Takes a move. One that goes nowhere (less than 10⁻⁹ mm) is dropped without a word.
+    pub fn push(&mut self, request: &MoveRequest) -> Result<(), MoveError> {
+        self.check(request)?;
+        // A dropped move is not forgotten: the next one starts where the plan ends.
+        let from = self.position.unwrap_or(request.from);
+        let Some(entry) = Entry::new(&MoveRequest { from, ..*request }, &self.limits) else {
+            self.position = Some(from);
+            self.pushed_position = Some(request.to);
+            return Ok(());
+        };
+        let print_time = self.print_time + self.window.nominal_time() + entry.nominal_time;
+        // Written so that NaN and infinity are refused too.
+        if !(entry.gain > 0.0 && entry.gain.is_finite() && print_time < RUN_TIME_MAX.0) {
+            return Err(MoveError::TooLong);
+        }
+        if self.ready.len() >= READY_MOVES_MAX {
+            return Err(MoveError::Full);
+        }
+        self.position = Some(request.to);
+        self.pushed_position = Some(request.to);
+        self.window.push(entry);
+        self.unplanned += 1;
+        if self.unplanned >= BATCH_MOVES {
+            self.unplanned = 0;
+            self.window.release_final(&mut self.print_time, &mut self.ready);
+        }
+        if self.window.len() >= LOOK_AHEAD_MOVES_MAX {
+            self.window.release_oldest(LOOK_AHEAD_MOVES_MAX / 2, &mut self.print_time, &mut self.ready);
+        }
+        Ok(())
+    }
+
+    /// Everything pushed so far ends at rest and can be taken.
+    pub fn flush(&mut self) {
+        self.unplanned = 0;
+        self.window.release_oldest(usize::MAX, &mut self.print_time, &mut self.ready);
+    }
+
+    /// The machine waits at rest: everything pushed so far ends, and the next move starts `pause` later. Negative
+    /// pauses are none; pauses stop at [`RUN_TIME_MAX`].
+    pub fn dwell(&mut self, pause: Seconds) {
+        self.flush();
+        if pause.0 > 0.0 {
+            self.print_time = (self.print_time + pause.0).min(RUN_TIME_MAX.0);
+        }
+    }
+
+    /// The next move whose speeds are final, in order.
+    pub fn pop(&mut self) -> Option<PlannedMove> {
+        self.ready.pop_front()
+    }
+
+    /// Moves that have been pushed and not been taken.
+    pub fn len(&self) -> usize {
+        self.window.len() + self.ready.len()
+    }
+
+    /// Whether everything pushed has been taken.
+    pub fn is_empty(&self) -> bool {
+        self.window.is_empty() && self.ready.is_empty()
+    }
+
+    /// How long the moves that have not been taken will last, at least: those in the window count as if they ran at
+    /// full speed throughout.
+    pub fn pending_time(&self) -> Seconds {
+        let taken_until = self.ready.front().map_or(self.print_time, |planned| planned.start_time);
+        Seconds(self.print_time + self.window.nominal_time() - taken_until)
+    }
+
+    /// Print time at which the last final move ends.
+    pub const fn print_time(&self) -> Seconds {
+        Seconds(self.print_time)
+    }
+
+    /// Where the last move pushed in this run ends: x, y, z, e in mm.
+    pub const fn position(&self) -> Option<[f64; 4]> {
+        self.pushed_position
+    }
+
+    fn check(&self, request: &MoveRequest) -> Result<(), MoveError> {
+        let usable = |v: &f64| v.abs() <= COORDINATE_MAX_MM;
+        if !(request.from.iter().all(usable) && request.to.iter().all(usable)) {
+            return Err(MoveError::Coordinate);
+        }
+        if !(request.feed.0 > 0.0 && request.feed.0.is_finite()) {
+            return Err(MoveError::Feed);
+        }
+        let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= GAP_MAX_MM;
+        match &self.pushed_position {
+            Some(end) if !end.iter().zip(&request.from).all(is_near) => Err(MoveError::Gap),
+            _ => Ok(()),
+        }
+    }
+}
