@@ -1,0 +1,174 @@
+//! Outputs: heaters, fans, enable pins. Switched at a clock, or pulse-width modulated by timers.
+//!
+//! An output with a `max_duration` that is not at its default has to be set again within that time, else the board
+//! stops: a host that died must not leave a heater on.
+
+use units::Clock32;
+use wire::ShutdownReason;
+
+use crate::{
+    board::{Board, Pin},
+    moves::{MovePool, OutputMove, Queue},
+    objects::After,
+};
+
+/// Durations have to be shorter than half the clock's range to be told from the past.
+const DURATION_TICKS_MAX: u32 = i32::MAX as u32;
+
+pub(crate) struct DigitalOut {
+    pin: Pin,
+    level: bool,
+    default_level: bool,
+    /// 0 is no limit.
+    max_duration: u32,
+    /// 0 is no modulation.
+    cycle_ticks: u32,
+    on_ticks: u32,
+    off_ticks: u32,
+    /// The next edge of the modulation.
+    toggle_at: Option<Clock32>,
+    /// When the next queued change is due or, with none queued, when `max_duration` ends.
+    load_at: Option<Clock32>,
+    queue: Queue,
+    last_queued: Clock32,
+}
+
+impl DigitalOut {
+    pub(crate) fn new(
+        board: &mut impl Board,
+        pin: Pin,
+        level: bool,
+        default_level: bool,
+        max_duration: u32,
+    ) -> Result<Self, ShutdownReason> {
+        // Nobody would watch an output that starts away from its default before the configuration is complete.
+        if max_duration > DURATION_TICKS_MAX || (max_duration != 0 && level != default_level) {
+            return Err(ShutdownReason::CommandParser);
+        }
+        board.configure_output(pin, level).map_err(|_| ShutdownReason::InvalidPin)?;
+        Ok(Self {
+            pin,
+            level,
+            default_level,
+            max_duration,
+            cycle_ticks: 0,
+            on_ticks: 0,
+            off_ticks: 0,
+            toggle_at: None,
+            load_at: None,
+            queue: Queue::new(),
+            last_queued: Clock32(0),
+        })
+    }
+
+    /// Sets the period of the modulation, for the changes that are queued from now on.
+    pub(crate) fn set_cycle(&mut self, cycle_ticks: u32) -> Result<(), ShutdownReason> {
+        if cycle_ticks > DURATION_TICKS_MAX || !self.queue.is_empty() {
+            return Err(ShutdownReason::InvalidPwm);
+        }
+        self.cycle_ticks = cycle_ticks;
+        Ok(())
+    }
+
+    /// When the timer is to wake.
+    pub(crate) fn wake(&self) -> Option<Clock32> {
+        match (self.toggle_at, self.load_at) {
+            (Some(toggle), Some(load)) => Some(if toggle.is_before(load) { toggle } else { load }),
+            (toggle, load) => toggle.or(load),
+        }
+    }
+
+    /// Queues a change; they have to come in the order of their clocks.
+    pub(crate) fn queue<const M: usize>(
+        &mut self,
+        now: Clock32,
+        moves: &mut MovePool<M>,
+        change: OutputMove,
+    ) -> Result<(), ShutdownReason> {
+        let clock = Clock32(change.clock);
+        if clock.is_before(now) || (!self.queue.is_empty() && clock.is_before(self.last_queued)) {
+            return Err(ShutdownReason::TimerTooClose);
+        }
+        if self.queue.is_empty() {
+            if self.load_at.is_some_and(|end| end.is_before(clock)) {
+                return Err(ShutdownReason::OutputTooFarAhead);
+            }
+            self.load_at = Some(clock);
+        }
+        self.last_queued = clock;
+        moves.push(&mut self.queue, change)
+    }
+
+    /// Sets the output now. What was queued is dropped.
+    pub(crate) fn update<const M: usize>(
+        &mut self,
+        board: &mut impl Board,
+        moves: &mut MovePool<M>,
+        level: bool,
+    ) {
+        moves.clear(&mut self.queue);
+        self.toggle_at = None;
+        self.set(board, level);
+        self.load_at = self.limit_from(board.now());
+    }
+
+    /// The next queued change, the next edge of the modulation, or the end of `max_duration`.
+    pub(crate) fn event<const M: usize>(
+        &mut self,
+        board: &mut impl Board,
+        moves: &mut MovePool<M>,
+        wake: Clock32,
+    ) -> Result<After, ShutdownReason> {
+        if self.load_at == Some(wake) {
+            self.load(board, moves, wake)?;
+        } else if self.toggle_at == Some(wake) {
+            self.set(board, !self.level);
+            self.toggle_at = Some(wake.wrapping_add(if self.level { self.on_ticks } else { self.off_ticks }));
+        }
+        Ok(self.wake().map_or(After::Done, After::Again))
+    }
+
+    fn load<const M: usize>(
+        &mut self,
+        board: &mut impl Board,
+        moves: &mut MovePool<M>,
+        wake: Clock32,
+    ) -> Result<(), ShutdownReason> {
+        let change: OutputMove = moves.pop(&mut self.queue).ok_or(ShutdownReason::MissedOutput)?;
+        self.set(board, change.on_ticks != 0);
+        self.toggle_at = None;
+        if change.on_ticks != 0 && change.on_ticks < self.cycle_ticks {
+            self.on_ticks = change.on_ticks;
+            self.off_ticks = self.cycle_ticks - change.on_ticks;
+            self.toggle_at = Some(wake.wrapping_add(self.on_ticks));
+        }
+        let limit = self.limit_from(wake);
+        let next = moves.front::<OutputMove>(self.queue).map(|next| Clock32(next.clock));
+        if let (Some(limit), Some(next)) = (limit, next)
+            && limit.is_before(next)
+        {
+            return Err(ShutdownReason::OutputTooFarAhead);
+        }
+        self.load_at = next.or(limit);
+        Ok(())
+    }
+
+    /// When the state that begins at `clock` has to be refreshed.
+    fn limit_from(&self, clock: Clock32) -> Option<Clock32> {
+        let is_default = self.level == self.default_level && self.toggle_at.is_none();
+        (self.max_duration != 0 && !is_default).then(|| clock.wrapping_add(self.max_duration))
+    }
+
+    fn set(&mut self, board: &mut impl Board, level: bool) {
+        self.level = level;
+        board.set_pin(self.pin, level);
+    }
+
+    /// Back to the default. The move pool is reset by the caller.
+    pub(crate) fn shut_down(&mut self, board: &mut impl Board) {
+        self.queue = Queue::new();
+        self.toggle_at = None;
+        self.load_at = None;
+        self.set(board, self.default_level);
+    }
+}
