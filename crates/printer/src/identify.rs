@@ -1,1 +1,154 @@
-//! To be written.
+//! Reads the board's dictionary, piece by piece.
+//!
+//! Sans-I/O: says what to ask ([`Identify::poll`]), takes the answers ([`Identify::receive`]). Responses are never
+//! retransmitted by the board, so every question is asked again when its answer fails to come. Knows nothing of
+//! blocks. Units: host time in seconds, sizes in bytes.
+
+use units::Seconds;
+use wire::dictionary::{Dictionary, DictionaryError};
+
+/// Bytes asked for at a time: with its frame a piece fits a block.
+pub const PIECE_BYTES: u8 = 40;
+/// The largest compressed dictionary that is read; real ones are below 16 KiB.
+pub const COMPRESSED_BYTES_MAX: usize = 1 << 18;
+/// A board that sends nothing for this long, in seconds, is silent.
+const SILENT_S: f64 = 5.0;
+/// The shortest and the longest time, in seconds, after which a question is asked again.
+const ASK_AGAIN_S_MIN: f64 = 0.025;
+const ASK_AGAIN_S_MAX: f64 = 0.5;
+/// The same before any answer has been timed.
+const ASK_AGAIN_S_FIRST: f64 = 0.1;
+/// A damaged dictionary is read this many times before that is an error: a damaged block passes the block's own
+/// check now and then on a very bad line.
+const READINGS_MAX: u32 = 3;
+
+/// Why there is no dictionary.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum IdentifyError {
+    /// The board does not answer.
+    #[error("the board does not answer")]
+    Silent,
+    /// There is no end to it.
+    #[error("the board's dictionary is larger than {COMPRESSED_BYTES_MAX} bytes")]
+    TooLarge,
+    /// It cannot be read.
+    #[error(transparent)]
+    Dictionary(#[from] DictionaryError),
+}
+
+/// A question: `identify offset=… count=…`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IdentifyRequest {
+    /// The first byte wanted.
+    pub offset: u32,
+    /// How many.
+    pub count: u8,
+}
+
+/// The reading of a dictionary.
+#[derive(Clone, Debug)]
+pub struct Identify {
+    compressed: Vec<u8>,
+    /// When the piece that is wanted next was asked for, and how often.
+    asked: Option<(f64, u32)>,
+    answer_s: Option<f64>,
+    /// When the last piece came, or the first question left.
+    last_s: Option<f64>,
+    readings: u32,
+    finished: bool,
+}
+
+impl Default for Identify {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Identify {
+    /// Nothing read yet.
+    pub const fn new() -> Self {
+        Self {
+            compressed: Vec::new(),
+            asked: None,
+            answer_s: None,
+            last_s: None,
+            readings: 1,
+            finished: false,
+        }
+    }
+
+    /// Bytes read so far.
+    pub fn bytes_read(&self) -> usize {
+        self.compressed.len()
+    }
+
+    /// When to poll next; `None` once it is finished.
+    pub fn next_wake(&self) -> Option<Seconds> {
+        if self.finished {
+            return None;
+        }
+        let Some((asked_s, times)) = self.asked else { return Some(Seconds(f64::NEG_INFINITY)) };
+        let wait = self.answer_s.map_or(ASK_AGAIN_S_FIRST, |answer_s| 3.0 * answer_s);
+        let doubled = wait.max(ASK_AGAIN_S_MIN) * f64::from(1_u32 << (times.clamp(1, 6) - 1));
+        Some(Seconds(asked_s + doubled.min(ASK_AGAIN_S_MAX)))
+    }
+
+    /// What to ask now, if anything; an error when the board is silent.
+    pub fn poll(&mut self, now: Seconds) -> Result<Option<IdentifyRequest>, IdentifyError> {
+        if self.next_wake().is_none_or(|wake| now < wake) {
+            return Ok(None);
+        }
+        let last_s = *self.last_s.get_or_insert(now.0);
+        if now.0 - last_s > SILENT_S {
+            self.finished = true;
+            return Err(IdentifyError::Silent);
+        }
+        let times = self.asked.map_or(1, |(_, times)| times.saturating_add(1));
+        self.asked = Some((now.0, times));
+        Ok(Some(IdentifyRequest { offset: self.compressed.len() as u32, count: PIECE_BYTES }))
+    }
+
+    /// Takes an `identify_response`; gives the dictionary when that was the last piece.
+    pub fn receive(
+        &mut self,
+        offset: u32,
+        data: &[u8],
+        now: Seconds,
+    ) -> Result<Option<Dictionary>, IdentifyError> {
+        // Answers to questions that were asked twice, or by a host before us.
+        let Some((asked_s, times)) = self.asked else { return Ok(None) };
+        if self.finished || offset as usize != self.compressed.len() || data.len() > usize::from(PIECE_BYTES)
+        {
+            return Ok(None);
+        }
+        if times == 1 {
+            let answer_s = now.0 - asked_s;
+            self.answer_s = Some(self.answer_s.map_or(answer_s, |before| before + (answer_s - before) / 4.0));
+        }
+        self.asked = None;
+        self.last_s = Some(now.0);
+        if !data.is_empty() {
+            self.compressed.extend_from_slice(data);
+            if self.compressed.len() > COMPRESSED_BYTES_MAX {
+                self.finished = true;
+                return Err(IdentifyError::TooLarge);
+            }
+            return Ok(None);
+        }
+        match Dictionary::parse(&self.compressed) {
+            Ok(dictionary) => {
+                self.finished = true;
+                Ok(Some(dictionary))
+            }
+            Err(_) if self.readings < READINGS_MAX => {
+                self.readings += 1;
+                self.compressed.clear();
+                Ok(None)
+            }
+            Err(error) => {
+                self.finished = true;
+                Err(error.into())
+            }
+        }
+    }
+}

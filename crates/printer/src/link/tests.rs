@@ -1,0 +1,1 @@
+//! The link against a board at the end of a bad line.
