@@ -1,1 +1,125 @@
-//! To be written.
+//! A machine as its `printer.cfg` describes it: text in, checked values and diagnostics out.
+//!
+//! Knows the format and the meaning of the options that are supported; knows nothing of files, boards or sessions.
+//! Lengths in millimetres, times in seconds, temperatures in °C, as in the file. Defaults are those of Klipper's
+//! public documentation (docs/Config_Reference.md).
+//!
+//! Nothing is ignored in silence: what is not understood is a diagnostic. Where leaving something out would make the
+//! machine move or heat otherwise than its owner expects, that is an error and there is no [`PrinterConfig`].
+
+mod diagnostics;
+mod document;
+mod hints;
+mod machine;
+mod pin;
+mod reader;
+mod rest;
+mod stepper;
+mod thermal;
+
+pub use diagnostics::{CONFIG_DIAGNOSTICS_MAX, ConfigDiagnostic, Severity};
+pub use document::CONFIG_BYTES_MAX;
+pub use machine::{FirmwareRetraction, IdleTimeoutConfig, Kinematics, MachineConfig, McuConfig};
+pub use pin::{PinSpec, Pull};
+pub use stepper::{MotorConfig, StepperConfig};
+pub use thermal::{ControlConfig, ExtruderConfig, FanConfig, HeaterConfig};
+
+use diagnostics::Log;
+use reader::{PinRegistry, Reader};
+
+/// A whole machine, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PrinterConfig {
+    /// `[mcu]`.
+    pub mcu: McuConfig,
+    /// `[printer]`.
+    pub printer: MachineConfig,
+    /// `[stepper_x]`, `[stepper_y]`, `[stepper_z]`, in this order.
+    pub steppers: [StepperConfig; 3],
+    /// `[extruder]`, if the machine has one.
+    pub extruder: Option<ExtruderConfig>,
+    /// `[heater_bed]`, if the machine has one.
+    pub heater_bed: Option<HeaterConfig>,
+    /// `[fan]`: the part fan, if the machine has one.
+    pub fan: Option<FanConfig>,
+    /// `[idle_timeout]`.
+    pub idle_timeout: IdleTimeoutConfig,
+    /// `[firmware_retraction]`: what G10 and G11 do; none where the section is missing.
+    pub firmware_retraction: Option<FirmwareRetraction>,
+    /// `[force_move] enable_force_move`: positions may be set by hand.
+    pub force_move: bool,
+}
+
+impl PrinterConfig {
+    /// Every heater of the machine.
+    pub fn heaters(&self) -> impl Iterator<Item = &HeaterConfig> {
+        self.extruder.iter().map(|extruder| &extruder.heater).chain(&self.heater_bed)
+    }
+}
+
+/// Reads a printer.cfg. The configuration is there exactly when no diagnostic is an error; diagnostics are in the
+/// order of the lines and at most [`CONFIG_DIAGNOSTICS_MAX`] and one.
+pub fn parse(text: &str) -> (Option<PrinterConfig>, Vec<ConfigDiagnostic>) {
+    let mut log = Log::default();
+    let config = build(text, &mut log);
+    let config = config.filter(|_| !log.has_errors());
+    (config, log.into_diagnostics())
+}
+
+/// Everything that the builders of sections share.
+struct Builder<'a> {
+    document: document::Document,
+    pins: PinRegistry,
+    log: &'a mut Log,
+}
+
+impl Builder<'_> {
+    /// A section that may be missing.
+    fn section(&mut self, name: &str) -> Option<Reader<'_>> {
+        let section = self.document.take(name)?;
+        Some(Reader::new(section, &mut self.pins, self.log))
+    }
+
+    /// A section that must be there.
+    fn required_section(&mut self, name: &str) -> Option<Reader<'_>> {
+        let Some(section) = self.document.take(name) else {
+            self.log.error(0, format!("[{name}] is missing: every printer.cfg needs that section"));
+            return None;
+        };
+        Some(Reader::new(section, &mut self.pins, self.log))
+    }
+}
+
+fn build(text: &str, log: &mut Log) -> Option<PrinterConfig> {
+    let document = document::read(text, log);
+    let mut builder = Builder { document, pins: PinRegistry::default(), log };
+    // All sections are read before the first missing one ends this, so that one reading shows every mistake.
+    let mcu = machine::mcu(&mut builder);
+    let printer = machine::printer(&mut builder);
+    let x = stepper::axis(&mut builder, "stepper_x");
+    let y = stepper::axis(&mut builder, "stepper_y");
+    let z = stepper::axis(&mut builder, "stepper_z");
+    let custom = thermal::custom_sensors(&mut builder);
+    let limits = printer.as_ref().map(|printer| (printer.max_velocity, printer.max_accel));
+    let extruder = thermal::extruder(&mut builder, &custom, limits);
+    let heater_bed = thermal::heater_bed(&mut builder, &custom);
+    let fan = thermal::fan(&mut builder);
+    let idle_timeout = machine::idle_timeout(&mut builder);
+    let firmware_retraction = machine::firmware_retraction(&mut builder);
+    let force_move = machine::force_move(&mut builder);
+    rest::report(builder.document.into_rest(), builder.log);
+    Some(PrinterConfig {
+        mcu: mcu?,
+        printer: printer?,
+        steppers: [x?, y?, z?],
+        extruder: extruder?,
+        heater_bed: heater_bed?,
+        fan: fan?,
+        idle_timeout: idle_timeout?,
+        firmware_retraction: firmware_retraction?,
+        force_move: force_move?,
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,163 @@
+//! `[mcu]`, `[printer]` and the small sections about the machine as a whole.
+
+use units::{Mm, MmPerS, MmPerS2, Seconds};
+
+use super::Builder;
+use super::diagnostics::excerpt;
+use super::reader::Range;
+
+/// The board. Which port it is on is the shell's to know; the name is kept for display.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct McuConfig {
+    /// `serial`, or the CAN identity, as written; may be empty.
+    pub serial: String,
+    /// Rate of a real serial line, bits per second. USB ignores it.
+    pub baud: u32,
+}
+
+/// How motors move the head.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kinematics {
+    /// A motor an axis.
+    Cartesian,
+}
+
+/// `[printer]`: limits of the whole machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MachineConfig {
+    /// How motors move the head.
+    pub kinematics: Kinematics,
+    /// Top speed along the path.
+    pub max_velocity: MmPerS,
+    /// Acceleration along the path.
+    pub max_accel: MmPerS2,
+    /// Speed at a right-angled corner.
+    pub square_corner_velocity: MmPerS,
+    /// Share of a move that must cruise, 0..1.
+    pub minimum_cruise_ratio: f64,
+    /// Top speed of Z; `max_velocity` where not given.
+    pub max_z_velocity: MmPerS,
+    /// Acceleration of Z; `max_accel` where not given.
+    pub max_z_accel: MmPerS2,
+}
+
+/// `[idle_timeout]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IdleTimeoutConfig {
+    /// Time without orders after which heaters and motors are switched off.
+    pub timeout: Seconds,
+}
+
+/// `[firmware_retraction]`: what G10 and G11 do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirmwareRetraction {
+    /// Filament pulled back by G10.
+    pub retract_length: Mm,
+    /// Its speed.
+    pub retract_speed: MmPerS,
+    /// Filament pushed by G11 beyond what was pulled back.
+    pub unretract_extra_length: Mm,
+    /// Its speed.
+    pub unretract_speed: MmPerS,
+}
+
+/// Klipper's own default; firmware without a fixed rate expects it.
+const BAUD_DEFAULT: u32 = 250_000;
+const VELOCITY_MAX: f64 = 10_000.0;
+const ACCEL_MAX: f64 = 1_000_000.0;
+/// A week: longer means "never", which a heater must not have.
+const IDLE_TIMEOUT_MAX_S: f64 = 604_800.0;
+
+pub(super) fn mcu(builder: &mut Builder<'_>) -> Option<McuConfig> {
+    let mut reader = builder.required_section("mcu")?;
+    let serial = reader.text("serial");
+    let canbus = reader.text("canbus_uuid");
+    let baud = reader.integer_or("baud", BAUD_DEFAULT, 2_400, 4_000_000);
+    reader.without_effect(
+        &["restart_method", "canbus_interface", "max_stepper_error"],
+        "connecting and restarting are done by whoever opens the port",
+    );
+    reader.finish();
+    Some(McuConfig { serial: serial.or(canbus).unwrap_or_default(), baud: baud? })
+}
+
+pub(super) fn printer(builder: &mut Builder<'_>) -> Option<MachineConfig> {
+    let mut reader = builder.required_section("printer")?;
+    let kinematics = match reader.required_text("kinematics").as_deref() {
+        None => None,
+        Some("cartesian") => Some(Kinematics::Cartesian),
+        Some(other) => {
+            reader.error(
+                "kinematics",
+                format!(
+                    "`{}` is not supported yet: only `cartesian` machines can be driven so far",
+                    excerpt(other)
+                ),
+            );
+            None
+        }
+    };
+    let max_velocity = reader.number("max_velocity", Range::above(0.0).to(VELOCITY_MAX));
+    let max_accel = reader.number("max_accel", Range::above(0.0).to(ACCEL_MAX));
+    let corner = reader.number_or("square_corner_velocity", 5.0, Range::from(0.0).to(VELOCITY_MAX));
+    let mut cruise = reader.number_or("minimum_cruise_ratio", 0.5, Range::from(0.0).to(0.999_999));
+    let old_decel = reader.optional_number("max_accel_to_decel", Range::above(0.0));
+    if let (Some(Some(decel)), Some(accel), false) =
+        (old_decel, max_accel, reader.has("minimum_cruise_ratio"))
+    {
+        let ratio = (1.0 - decel / accel).max(0.0);
+        reader.warning(
+            "max_accel_to_decel",
+            format!("an old name, read as `minimum_cruise_ratio: {ratio:.3}`; write that instead"),
+        );
+        cruise = Some(ratio);
+    }
+    let max_z_velocity = reader.optional_number("max_z_velocity", Range::above(0.0).to(VELOCITY_MAX));
+    let max_z_accel = reader.optional_number("max_z_accel", Range::above(0.0).to(ACCEL_MAX));
+    reader.finish();
+    let (max_velocity, max_accel) = (max_velocity?, max_accel?);
+    old_decel?;
+    Some(MachineConfig {
+        kinematics: kinematics?,
+        max_velocity: MmPerS(max_velocity),
+        max_accel: MmPerS2(max_accel),
+        square_corner_velocity: MmPerS(corner?),
+        minimum_cruise_ratio: cruise?,
+        // As in Klipper, the whole machine's limits hold for Z too.
+        max_z_velocity: MmPerS(max_z_velocity?.unwrap_or(max_velocity).min(max_velocity)),
+        max_z_accel: MmPerS2(max_z_accel?.unwrap_or(max_accel).min(max_accel)),
+    })
+}
+
+pub(super) fn idle_timeout(builder: &mut Builder<'_>) -> Option<IdleTimeoutConfig> {
+    const DEFAULT_S: f64 = 600.0;
+    let Some(mut reader) = builder.section("idle_timeout") else {
+        return Some(IdleTimeoutConfig { timeout: Seconds(DEFAULT_S) });
+    };
+    let timeout = reader.number_or("timeout", DEFAULT_S, Range::above(0.0).to(IDLE_TIMEOUT_MAX_S));
+    reader.not_supported(&["gcode"], "heaters and motors are switched off instead of running these commands");
+    reader.finish();
+    Some(IdleTimeoutConfig { timeout: Seconds(timeout?) })
+}
+
+pub(super) fn firmware_retraction(builder: &mut Builder<'_>) -> Option<Option<FirmwareRetraction>> {
+    let Some(mut reader) = builder.section("firmware_retraction") else { return Some(None) };
+    let retract_length = reader.number_or("retract_length", 0.0, Range::from(0.0).to(1_000.0));
+    let retract_speed = reader.number_or("retract_speed", 20.0, Range::from(1.0).to(VELOCITY_MAX));
+    let extra = reader.number_or("unretract_extra_length", 0.0, Range::from(0.0).to(1_000.0));
+    let unretract_speed = reader.number_or("unretract_speed", 10.0, Range::from(1.0).to(VELOCITY_MAX));
+    reader.finish();
+    Some(Some(FirmwareRetraction {
+        retract_length: Mm(retract_length?),
+        retract_speed: MmPerS(retract_speed?),
+        unretract_extra_length: Mm(extra?),
+        unretract_speed: MmPerS(unretract_speed?),
+    }))
+}
+
+pub(super) fn force_move(builder: &mut Builder<'_>) -> Option<bool> {
+    let Some(mut reader) = builder.section("force_move") else { return Some(false) };
+    let enabled = reader.boolean_or("enable_force_move", false);
+    reader.finish();
+    enabled
+}

@@ -1,0 +1,329 @@
+//! Typed, checked access to one section: every option asked for is known, every other one is reported at the end.
+
+use std::collections::BTreeMap;
+
+use super::diagnostics::{Log, excerpt};
+use super::document::Section;
+use super::hints::hint;
+use super::pin::{PinSpec, PinUse};
+
+/// The numbers an option may have.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Range {
+    min: f64,
+    max: f64,
+    min_excluded: bool,
+}
+
+impl Range {
+    /// Above `min`, and at most the largest number that makes sense for any machine of this kind.
+    pub(super) const fn above(min: f64) -> Self {
+        Self { min, max: NUMBER_MAX, min_excluded: true }
+    }
+
+    /// `min` or more.
+    pub(super) const fn from(min: f64) -> Self {
+        Self { min, max: NUMBER_MAX, min_excluded: false }
+    }
+
+    /// The same with an upper end, included.
+    pub(super) const fn to(self, max: f64) -> Self {
+        Self { max, ..self }
+    }
+
+    fn contains(self, value: f64) -> bool {
+        value <= self.max && if self.min_excluded { value > self.min } else { value >= self.min }
+    }
+
+    fn in_words(self) -> String {
+        let (min, max) = (self.min, self.max);
+        match (self.min_excluded, max < NUMBER_MAX) {
+            (true, true) => format!("above {min} and at most {max}"),
+            (false, true) => format!("from {min} to {max}"),
+            (true, false) => format!("above {min}"),
+            (false, false) => format!("{min} or more"),
+        }
+    }
+}
+
+/// Larger numbers are typing errors: no length, speed, acceleration or time of a printer comes near.
+const NUMBER_MAX: f64 = 1e7;
+
+/// Longest option name for which a similar one is sought.
+const SUGGESTION_BYTES_MAX: usize = 48;
+
+/// Which option took which pin: two must not share one.
+#[derive(Debug, Default)]
+pub(super) struct PinRegistry {
+    taken: BTreeMap<String, String>,
+}
+
+/// One section being read.
+pub(super) struct Reader<'a> {
+    section: Section,
+    /// Options that were asked for, found or not.
+    asked: Vec<&'static str>,
+    pins: &'a mut PinRegistry,
+    pub(super) log: &'a mut Log,
+}
+
+impl<'a> Reader<'a> {
+    pub(super) const fn new(section: Section, pins: &'a mut PinRegistry, log: &'a mut Log) -> Self {
+        Self { section, asked: Vec::new(), pins, log }
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.section.name
+    }
+
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.section.entries.contains_key(key)
+    }
+
+    /// The line of an option, or of the section where it is missing.
+    pub(super) fn line_of(&self, key: &str) -> u32 {
+        self.section.entries.get(key).map_or(self.section.line, |entry| entry.line)
+    }
+
+    /// Reports an error of an option that is about more than its own value.
+    pub(super) fn error(&mut self, key: &str, problem: impl core::fmt::Display) {
+        let line = self.line_of(key);
+        self.log.error(line, format!("[{}] {key}: {problem}", excerpt(&self.section.name)));
+    }
+
+    pub(super) fn warning(&mut self, key: &str, problem: impl core::fmt::Display) {
+        let line = self.line_of(key);
+        self.log.warning(line, format!("[{}] {key}: {problem}", excerpt(&self.section.name)));
+    }
+
+    /// The text of an option that may be missing. One that is there but empty counts as missing.
+    pub(super) fn text(&mut self, key: &'static str) -> Option<String> {
+        self.asked.push(key);
+        let value = self.section.entries.get(key)?.value.trim();
+        (!value.is_empty()).then(|| value.to_owned())
+    }
+
+    /// The text of an option that must be there.
+    pub(super) fn required_text(&mut self, key: &'static str) -> Option<String> {
+        let text = self.text(key);
+        if text.is_none() {
+            self.missing(key);
+        }
+        text
+    }
+
+    fn missing(&mut self, key: &str) {
+        let problem = if self.has(key) { "it has no value" } else { "it is missing" };
+        self.error(key, format!("{problem}; write {}", hint(key)));
+    }
+
+    fn number_from(&mut self, key: &str, text: &str, range: Range) -> Option<f64> {
+        let Ok(value) = text.parse::<f64>() else {
+            self.error(key, format!("`{}` is not a number; write {}", excerpt(text), hint(key)));
+            return None;
+        };
+        // Not a number is in no range.
+        if !range.contains(value) {
+            let words = range.in_words();
+            self.error(key, format!("`{}` must be {words}; write {}", excerpt(text), hint(key)));
+            return None;
+        }
+        Some(value)
+    }
+
+    /// A number that must be there.
+    pub(super) fn number(&mut self, key: &'static str, range: Range) -> Option<f64> {
+        let text = self.required_text(key)?;
+        self.number_from(key, &text, range)
+    }
+
+    /// A number with a default; a wrong one is reported and none.
+    pub(super) fn number_or(&mut self, key: &'static str, default: f64, range: Range) -> Option<f64> {
+        match self.text(key) {
+            Some(text) => self.number_from(key, &text, range),
+            None => Some(default),
+        }
+    }
+
+    /// A number that may be missing: `Some(None)` then, `None` where it is wrong.
+    pub(super) fn optional_number(&mut self, key: &'static str, range: Range) -> Option<Option<f64>> {
+        match self.text(key) {
+            Some(text) => self.number_from(key, &text, range).map(Some),
+            None => Some(None),
+        }
+    }
+
+    fn integer_from(&mut self, key: &str, text: &str, min: u32, max: u32) -> Option<u32> {
+        let value = text.parse::<u32>().ok().filter(|value| (min..=max).contains(value));
+        if value.is_none() {
+            let problem = format!(
+                "`{}` must be a whole number from {min} to {max}; write {}",
+                excerpt(text),
+                hint(key)
+            );
+            self.error(key, problem);
+        }
+        value
+    }
+
+    pub(super) fn integer(&mut self, key: &'static str, min: u32, max: u32) -> Option<u32> {
+        let text = self.required_text(key)?;
+        self.integer_from(key, &text, min, max)
+    }
+
+    pub(super) fn integer_or(&mut self, key: &'static str, default: u32, min: u32, max: u32) -> Option<u32> {
+        match self.text(key) {
+            Some(text) => self.integer_from(key, &text, min, max),
+            None => Some(default),
+        }
+    }
+
+    /// A switch that may be missing: `Some(None)` then, `None` where it is wrong.
+    pub(super) fn optional_boolean(&mut self, key: &'static str) -> Option<Option<bool>> {
+        let Some(text) = self.text(key) else { return Some(None) };
+        match text.to_ascii_lowercase().as_str() {
+            "1" | "yes" | "true" | "on" => Some(Some(true)),
+            "0" | "no" | "false" | "off" => Some(Some(false)),
+            _ => {
+                self.error(key, format!("`{}` must be true or false", excerpt(&text)));
+                None
+            }
+        }
+    }
+
+    pub(super) fn boolean_or(&mut self, key: &'static str, default: bool) -> Option<bool> {
+        self.optional_boolean(key).map(|value| value.unwrap_or(default))
+    }
+
+    fn pin_from(&mut self, key: &'static str, text: &str, usage: PinUse) -> Option<PinSpec> {
+        let line = self.line_of(key);
+        match PinSpec::parse(text, line, usage) {
+            Ok(pin) => {
+                self.claim(key, &pin);
+                Some(pin)
+            }
+            Err(advice) => {
+                self.error(key, format!("`{}` is not a pin that can be used here: {advice}", excerpt(text)));
+                None
+            }
+        }
+    }
+
+    /// Drivers often share one enable line; any other pin with two jobs is a mistake.
+    fn claim(&mut self, key: &'static str, pin: &PinSpec) {
+        let user = format!("[{}] {key} (line {})", excerpt(&self.section.name), pin.line);
+        match self.pins.taken.get(&pin.name) {
+            Some(other) if !(key == "enable_pin" && other.contains("] enable_pin ")) => {
+                let problem = format!("pin {} is already used by {other}; each pin has one job", pin.name);
+                self.error(key, problem);
+            }
+            Some(_) => {}
+            None => {
+                self.pins.taken.insert(pin.name.clone(), user);
+            }
+        }
+    }
+
+    pub(super) fn pin(&mut self, key: &'static str, usage: PinUse) -> Option<PinSpec> {
+        let text = self.required_text(key)?;
+        self.pin_from(key, &text, usage)
+    }
+
+    /// A pin that may be missing: `Some(None)` then, `None` where it is wrong.
+    pub(super) fn optional_pin(&mut self, key: &'static str, usage: PinUse) -> Option<Option<PinSpec>> {
+        match self.text(key) {
+            Some(text) => self.pin_from(key, &text, usage).map(Some),
+            None => Some(None),
+        }
+    }
+
+    /// Options of Klipper that have no effect here, and that nothing is lost by.
+    pub(super) fn without_effect(&mut self, keys: &[&'static str], why: &str) {
+        for &key in keys {
+            self.asked.push(key);
+            if self.has(key) {
+                let line = self.line_of(key);
+                self.log.info(line, format!("[{}] {key} has no effect: {why}", excerpt(&self.section.name)));
+            }
+        }
+    }
+
+    /// Options of Klipper that change what the machine does but are not supported yet.
+    pub(super) fn not_supported(&mut self, keys: &[&'static str], consequence: &str) {
+        for &key in keys {
+            self.asked.push(key);
+            if self.has(key) {
+                self.warning(key, format!("not supported yet: {consequence}"));
+            }
+        }
+    }
+
+    /// Reports the options that nobody asked for.
+    pub(super) fn finish(self) {
+        for (key, entry) in &self.section.entries {
+            if self.asked.iter().any(|asked| asked == key) {
+                continue;
+            }
+            let mut message = format!(
+                "[{}] has no option `{}`: the line has no effect",
+                excerpt(&self.section.name),
+                excerpt(key)
+            );
+            if let Some(similar) = most_similar(key, &self.asked) {
+                message.push_str(&format!("; did you mean `{similar}`?"));
+            }
+            self.log.warning(entry.line, message);
+        }
+    }
+}
+
+/// The known name that differs by the fewest typing errors, if by few enough to be one.
+fn most_similar(key: &str, known: &[&'static str]) -> Option<&'static str> {
+    if key.len() > SUGGESTION_BYTES_MAX {
+        return None;
+    }
+    let (distance, name) = known.iter().map(|name| (edit_distance(key, name), *name)).min()?;
+    (distance <= 1 + name.len() / 5).then_some(name)
+}
+
+/// Insertions, deletions and replacements between two short names (Wagner and Fischer, 1974).
+fn edit_distance(one: &str, other: &str) -> usize {
+    let other = other.as_bytes();
+    let mut row: Vec<usize> = (0..=other.len()).collect();
+    for (i, a) in one.bytes().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, b) in other.iter().enumerate() {
+            let replaced = diagonal + usize::from(a != *b);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[other.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn typing_errors_find_their_option() {
+        let known = ["rotation_distance", "microsteps", "step_pin"];
+        assert_eq!(most_similar("rotation_distanse", &known), Some("rotation_distance"));
+        assert_eq!(most_similar("microstep", &known), Some("microsteps"));
+        assert_eq!(most_similar("colour", &known), None);
+        assert_eq!(most_similar(&"x".repeat(1_000), &known), None);
+    }
+
+    #[test]
+    fn ranges_know_their_ends_and_exclude_what_is_no_number() {
+        assert!(!Range::above(0.0).contains(0.0));
+        assert!(Range::from(0.0).contains(0.0));
+        assert!(Range::above(0.0).to(1.0).contains(1.0));
+        for value in [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e300] {
+            assert!(!Range::from(0.0).contains(value));
+        }
+        assert_eq!(Range::above(0.0).to(1.0).in_words(), "above 0 and at most 1");
+        assert_eq!(Range::from(2.0).in_words(), "2 or more");
+    }
+}
