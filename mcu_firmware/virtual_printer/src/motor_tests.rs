@@ -1,0 +1,175 @@
+use super::*;
+
+const CLOCK_HZ: u32 = 12_000_000;
+/// 80 steps a millimetre.
+const MICROSTEPS: u32 = 16;
+
+fn carriage() -> Mechanics {
+    Mechanics::nema17(MICROSTEPS, 40.0, 0.5)
+}
+
+fn motor(mechanics: &Mechanics, time_step_us: u32) -> MotorState {
+    let mut motor = MotorState::new(mechanics, CLOCK_HZ, 0, time_step_us, Stops::NONE);
+    motor.energise(0, true);
+    motor
+}
+
+/// Clocks of the steps of a trapezoid: from rest to `speed` and back to rest, in steps, steps/s, steps/s².
+fn trapezoid(start: u64, steps: u32, speed: f64, accel: f64) -> Vec<u64> {
+    let total = f64::from(steps);
+    let ramp = (speed * speed / (2.0 * accel)).min(total / 2.0);
+    let top = (2.0 * accel * ramp).sqrt();
+    let (ramp_s, cruise_s) = (top / accel, (total - 2.0 * ramp) / top);
+    let end_s = 2.0 * ramp_s + cruise_s;
+    let time = |at: f64| {
+        if at < ramp {
+            (2.0 * at / accel).sqrt()
+        } else if at < total - ramp {
+            ramp_s + (at - ramp) / top
+        } else {
+            end_s - (2.0 * (total - at) / accel).sqrt()
+        }
+    };
+    (0..steps).map(|k| start + (time(f64::from(k) + 0.5) * f64::from(CLOCK_HZ)) as u64).collect()
+}
+
+/// Runs a trapezoid and lets the rotor come to rest; gives the rotor's place every 5 ms and the steps lost.
+fn run(motor: &mut MotorState, steps: u32, speed: f64, accel: f64) -> (Vec<f64>, i64) {
+    let mut places = Vec::new();
+    let mut look = 60_000;
+    let clocks = trapezoid(1000, steps, speed, accel);
+    let end = clocks.last().copied().unwrap_or(0) + 6_000_000;
+    for clock in clocks {
+        while look <= clock {
+            motor.advance(look);
+            places.push(motor.rotor());
+            look += 60_000;
+        }
+        motor.step(clock, true);
+    }
+    motor.advance(end);
+    places.push(motor.rotor());
+    (places, motor.lost())
+}
+
+#[test]
+fn the_sine_is_a_sine() {
+    for i in -4000..4000 {
+        let turns = f64::from(i) / 777.0;
+        assert!((sin_turns(turns) - libm::sin(turns * TURN_RAD)).abs() < 1e-6, "{turns}");
+    }
+}
+
+#[test]
+fn no_steps_are_lost_at_sane_speeds() {
+    // 300 mm/s at 3000 mm/s² on 80 steps/mm.
+    let mut motor = motor(&carriage(), TIME_STEP_US);
+    let (_, lost) = run(&mut motor, 16_000, 24_000.0, 240_000.0);
+    assert_eq!(lost, 0);
+    assert!((motor.rotor() - 16_000.0).abs() < 2.0, "friction leaves a small lag: {}", motor.rotor());
+}
+
+#[test]
+fn steps_are_lost_when_accelerated_too_hard() {
+    // The motor's own limit: 0.4 N·m over 2.6e-5 kg·m² is about 100 000 mm/s².
+    let mut motor = motor(&carriage(), TIME_STEP_US);
+    let (_, lost) = run(&mut motor, 16_000, 40_000.0, 20_000_000.0);
+    assert!(lost > 100, "{lost}");
+    assert_eq!(lost % i64::from(4 * MICROSTEPS), 0, "whole electrical periods");
+}
+
+#[test]
+fn steps_are_lost_beyond_the_pull_out_speed() {
+    // A load of half the holding torque: at three times the corner speed the motor no longer carries it.
+    let mechanics = Mechanics { load_nm: 0.2, ..carriage() };
+    let per_turn = mechanics.microsteps_per_rotation();
+    let (_, slow) = run(&mut motor(&mechanics, TIME_STEP_US), 40_000, 6.0 * per_turn, 240_000.0);
+    assert_eq!(slow, 0);
+    let (_, fast) = run(&mut motor(&mechanics, TIME_STEP_US), 100_000, 24.0 * per_turn, 240_000.0);
+    assert!(fast > 0, "{fast}");
+}
+
+#[test]
+fn halving_the_time_step_changes_no_result() {
+    let cases = [
+        ("sane", 16_000, 24_000.0, 240_000.0),
+        ("slow", 400, 300.0, 240_000.0),
+        ("resonant", 3000, 9000.0, 20_000.0),
+        ("hard", 8000, 24_000.0, 4_000_000.0),
+        ("stalls", 16_000, 60_000.0, 200_000_000.0),
+    ];
+    for (name, steps, speed, accel) in cases {
+        for mechanics in [carriage(), Mechanics::extruder(MICROSTEPS), Mechanics::nema17(2, 8.0, 1.0)] {
+            let (whole, lost) = run(&mut motor(&mechanics, TIME_STEP_US), steps, speed, accel);
+            let (half, lost_half) = run(&mut motor(&mechanics, TIME_STEP_US / 2), steps, speed, accel);
+            assert_eq!(lost, lost_half, "{name}, {mechanics:?}");
+            let rest = (whole.last().unwrap_or(&0.0) - half.last().unwrap_or(&0.0)).abs();
+            assert!(
+                rest < 0.15 * f64::from(mechanics.microsteps),
+                "{name}: {rest} apart at rest, {mechanics:?}"
+            );
+            if lost == 0 {
+                let pairs = whole.iter().zip(&half);
+                let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(
+                    apart < 0.15 * f64::from(mechanics.microsteps),
+                    "{name}: {apart} apart, {mechanics:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_disabled_driver_holds_nothing() {
+    let mut motor = motor(&carriage(), TIME_STEP_US);
+    motor.energise(10, false);
+    let (_, lost) = run(&mut motor, 6400, 5000.0, 50_000.0);
+    assert_eq!(motor.rotor(), 0.0);
+    assert_eq!(lost, 6400);
+}
+
+#[test]
+fn the_frame_stops_the_carriage() {
+    let stops = Stops { min: -100.0, max: 500.0 };
+    let mut motor = MotorState::new(&carriage(), CLOCK_HZ, 0, TIME_STEP_US, stops);
+    motor.energise(0, true);
+    let (places, lost) = run(&mut motor, 4000, 4000.0, 100_000.0);
+    assert!(places.iter().all(|&place| place <= 500.0));
+    assert!(lost >= 3400, "{lost}");
+}
+
+#[test]
+fn asking_more_often_changes_nothing() {
+    let clocks = trapezoid(1000, 4000, 24_000.0, 240_000.0);
+    let (mut seldom, mut often) = (motor(&carriage(), TIME_STEP_US), motor(&carriage(), TIME_STEP_US));
+    for (index, &clock) in clocks.iter().enumerate() {
+        seldom.step(clock, index % 700 < 400);
+        often.advance(clock - 3);
+        often.step(clock, index % 700 < 400);
+        often.advance(clock + 1);
+    }
+    let end = clocks.last().copied().unwrap_or(0) + 1_000_000;
+    for at in (0..1000).map(|part| end + part * 12_345) {
+        often.advance(at);
+    }
+    seldom.advance(end + 999 * 12_345);
+    assert_eq!(seldom.rotor(), often.rotor());
+}
+
+#[test]
+fn at_rest_it_settles() {
+    let mut motor = motor(&carriage(), TIME_STEP_US);
+    run(&mut motor, 100, 1000.0, 100_000.0);
+    assert!(motor.settled);
+    // A year of standing still costs nothing.
+    motor.advance(u64::from(CLOCK_HZ) * 3600 * 24 * 365);
+}
+
+#[test]
+fn unsound_mechanics_are_seen() {
+    assert!(carriage().is_sound());
+    assert!(!Mechanics { inertia_kg_m2: 0.0, ..carriage() }.is_sound());
+    assert!(!Mechanics { microsteps: 0, ..carriage() }.is_sound());
+    assert!(!Mechanics { load_nm: f64::NAN, ..carriage() }.is_sound());
+}
