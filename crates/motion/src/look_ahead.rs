@@ -61,10 +61,10 @@ pub struct LookAhead {
     ready: VecDeque<PlannedMove>,
     /// Print time at which the last released move ends, s.
     print_time: f64,
-    /// Where the last move taken in this run ends; moves that went nowhere leave it.
+    /// Where the last planned move ends; moves that went nowhere leave it.
+    planned_position: Option<[f64; 4]>,
+    /// Where the last move pushed ends.
     position: Option<[f64; 4]>,
-    /// Where the last move pushed ends, even if it was dropped.
-    pushed_position: Option<[f64; 4]>,
     /// Moves pushed since the last backward pass.
     unplanned: usize,
 }
@@ -78,8 +78,8 @@ impl LookAhead {
             window: Window::default(),
             ready: VecDeque::new(),
             print_time: 0.0,
+            planned_position: None,
             position: None,
-            pushed_position: None,
             unplanned: 0,
         })
     }
@@ -102,8 +102,8 @@ impl LookAhead {
         self.window = Window::default();
         self.ready.clear();
         self.print_time = 0.0;
+        self.planned_position = None;
         self.position = None;
-        self.pushed_position = None;
         self.unplanned = 0;
     }
 
@@ -111,10 +111,10 @@ impl LookAhead {
     pub fn push(&mut self, request: &MoveRequest) -> Result<(), MoveError> {
         self.check(request)?;
         // A dropped move is not forgotten: the next one starts where the plan ends.
-        let from = self.position.unwrap_or(request.from);
+        let from = self.planned_position.unwrap_or(request.from);
         let Some(entry) = Entry::new(&MoveRequest { from, ..*request }, &self.limits) else {
-            self.position = Some(from);
-            self.pushed_position = Some(request.to);
+            self.planned_position = Some(from);
+            self.position = Some(request.to);
             return Ok(());
         };
         let print_time = self.print_time + self.window.nominal_time() + entry.nominal_time;
@@ -125,8 +125,8 @@ impl LookAhead {
         if self.ready.len() >= READY_MOVES_MAX {
             return Err(MoveError::Full);
         }
+        self.planned_position = Some(request.to);
         self.position = Some(request.to);
-        self.pushed_position = Some(request.to);
         self.window.push(entry);
         self.unplanned += 1;
         if self.unplanned >= BATCH_MOVES {
@@ -183,7 +183,7 @@ impl LookAhead {
 
     /// Where the last move pushed in this run ends: x, y, z, e in mm.
     pub const fn position(&self) -> Option<[f64; 4]> {
-        self.pushed_position
+        self.position
     }
 
     fn check(&self, request: &MoveRequest) -> Result<(), MoveError> {
@@ -195,7 +195,7 @@ impl LookAhead {
             return Err(MoveError::Feed);
         }
         let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= GAP_MAX_MM;
-        match &self.pushed_position {
+        match &self.position {
             Some(end) if !end.iter().zip(&request.from).all(is_near) => Err(MoveError::Gap),
             _ => Ok(()),
         }

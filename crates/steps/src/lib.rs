@@ -1,1 +1,69 @@
-//! To be written.
+//! From trajectories to `queue_step`: when each motor steps, in integer ticks, packed into few commands.
+//!
+//! Does: turns planned moves into the path of each motor, finds the time at which each step is due, and packs the steps
+//! into (interval, count, add) within a stated error. Does not know: bytes, oids, pins, the wire, real clocks. Ticks count
+//! from the start of a run of motion, so that the same moves give the same commands on every run and platform.
+//!
+//! Units: mm and seconds at the edges; inside, steps and ticks.
+//!
+//! A motor's step grid lies at `k · step_distance` of its absolute position. A step is due when the commanded position
+//! crosses half-way between two grid positions; a position exactly half-way belongs to the upper one. There is no
+//! hysteresis and nothing accumulates: after any move the count is that of the move's end, rounded.
+//!
+//! The packing is line stabbing: [`generator`](StepGenerator) → `crossing` (step times) → `compressor` (windows around
+//! them) → `stabbing` (the longest quadratic through the windows; after J. O'Rourke, "An on-line algorithm for fitting
+//! straight lines between data ranges", 1981).
+
+mod compressor;
+mod crossing;
+mod generator;
+mod kinematics;
+mod stabbing;
+
+pub use compressor::{RUN_SPAN_MAX, STEP_HOLD_MAX, STEPS_BUFFERED_MAX};
+pub use generator::{MotorStats, PIECES_MAX, PushError, SpecError, StepGenerator, StepperSpec};
+pub use kinematics::{Cartesian, Kinematics, MotorSegment};
+
+use units::Ticks;
+
+/// What one motor is told to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StepCommand {
+    /// Which motor: its place in the list of steppers.
+    pub motor: usize,
+    /// What it does.
+    pub kind: StepCommandKind,
+    /// Run clock of the motor's step before: the first interval counts from it.
+    pub start: Ticks,
+    /// Run clock of the command's last step; `start` where it has none.
+    pub end: Ticks,
+}
+
+/// The two commands that a stepper knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepCommandKind {
+    /// The direction of the steps that follow.
+    SetDir {
+        /// Towards larger positions.
+        forward: bool,
+    },
+    /// `count` steps: the first comes `interval` ticks after the step before, and each later interval is `add` longer
+    /// than the one before it.
+    ///
+    /// After a rest of more than [`IDLE_TICKS_MAX`] this is a single step, and `interval` is the distance modulo 2³²
+    /// (never 0): the board's clock wraps, so the sender holds the command back until it is near enough.
+    QueueStep {
+        /// Ticks, at least 1.
+        interval: u32,
+        /// Steps, at least 1.
+        count: u16,
+        /// Ticks, 0 where `count` is 1.
+        add: i16,
+    },
+}
+
+/// The longest interval that a board may be sent ahead of time, in ticks.
+pub const IDLE_TICKS_MAX: u64 = 3 << 28;
+
+#[cfg(test)]
+mod tests;
