@@ -11,9 +11,12 @@ pub(crate) const FIT_STEPS_MAX: u32 = 4096;
 /// With this many values of `add` or fewer, each is followed by itself.
 const CANDIDATES_MAX: usize = 4;
 /// Around the middle of the possible values of `add`, this many to either side are tried.
-const TRIES_MAX: i32 = 4;
+const TRIES_MAX: i64 = 4;
 /// Values of `add` that take one byte on the wire.
-const ADD_SHORT: core::ops::RangeInclusive<i32> = -32..=95;
+const ADD_SHORT: core::ops::RangeInclusive<i64> = -32..=95;
+/// Values of `add` that the wire can express.
+const ADD_MIN: i64 = i16::MIN as i64;
+const ADD_MAX: i64 = i16::MAX as i64;
 
 /// A command's coefficients and how many steps it covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +51,7 @@ impl Line {
 /// One value of `add` with the intervals that pass every window with it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Candidate {
-    add: i32,
+    add: i64,
     low: f64,
     high: f64,
 }
@@ -111,8 +114,8 @@ impl Stabbing {
     }
 
     fn start(&mut self, low: f64, high: f64) {
-        self.steepest = Line { offset: low, slope: 0.5 * f64::from(i16::MAX) };
-        self.flattest = Line { offset: high, slope: 0.5 * f64::from(i16::MIN) };
+        self.steepest = Line { offset: low, slope: f64::INFINITY };
+        self.flattest = Line { offset: high, slope: f64::NEG_INFINITY };
         self.lows.restart(low);
         self.highs.restart(high);
         self.slits.push((low, high));
@@ -122,7 +125,7 @@ impl Stabbing {
     fn narrow(&mut self, x: f64, low: f64, high: f64) -> bool {
         let (top, bottom) = (self.steepest.at(x), self.flattest.at(x));
         // Too low for the steepest line's end, or too high for the flattest one's: nothing passes.
-        if low > top || high < bottom {
+        if low > top || high < bottom || !self.has_add() {
             return false;
         }
         self.slits.push((low, high));
@@ -143,12 +146,17 @@ impl Stabbing {
         true
     }
 
+    /// Whether the wire can express the slope of any line that is left.
+    fn has_add(&self) -> bool {
+        2.0 * self.flattest.slope <= f64::from(i16::MAX) && 2.0 * self.steepest.slope >= f64::from(i16::MIN)
+    }
+
     /// Turns the lines into one candidate for each `add`, if there are few enough and any has an interval.
     fn start_following(&mut self) {
         let first = ceil(2.0 * self.flattest.slope);
         let last = floor(2.0 * self.steepest.slope);
-        for add in first..=last {
-            let candidate = self.candidate(add as i32);
+        for add in first.max(ADD_MIN)..=last.min(ADD_MAX) {
+            let candidate = self.candidate(add);
             if self.followed < CANDIDATES_MAX && has_integer(candidate.low, candidate.high) {
                 self.candidates[self.followed] = candidate;
                 self.followed += 1;
@@ -157,8 +165,8 @@ impl Stabbing {
     }
 
     /// The intervals that pass all windows with this `add`, which must lie between the two extreme lines.
-    fn candidate(&self, add: i32) -> Candidate {
-        let slope = 0.5 * f64::from(add);
+    fn candidate(&self, add: i64) -> Candidate {
+        let slope = 0.5 * add as f64;
         let low = self.lows.points().fold(f64::NEG_INFINITY, |low, (x, y)| low.max(y - slope * x));
         let high = self.highs.points().fold(f64::INFINITY, |high, (x, y)| high.min(y - slope * x));
         Candidate { add, low, high }
@@ -170,7 +178,7 @@ impl Stabbing {
         let mut count = 0;
         let half_x = 0.5 * x;
         for candidate in &self.candidates[..self.followed] {
-            let rise = f64::from(candidate.add) * half_x;
+            let rise = candidate.add as f64 * half_x;
             let next = Candidate {
                 add: candidate.add,
                 low: candidate.low.max(low - rise),
@@ -202,12 +210,15 @@ impl Stabbing {
             let (low, high) = self.slits[0];
             return Fit::new(Candidate { add: 0, low, high }, 1);
         }
-        let first = ceil(2.0 * self.flattest.slope) as i32;
-        let last = floor(2.0 * self.steepest.slope) as i32;
-        let middle = ceil(self.flattest.slope + self.steepest.slope - 0.5) as i32;
+        let first = ceil(2.0 * self.flattest.slope);
+        let last = floor(2.0 * self.steepest.slope);
+        let middle = ceil(self.flattest.slope + self.steepest.slope - 0.5).clamp(ADD_MIN, ADD_MAX);
         let short = (first.max(*ADD_SHORT.start()), last.min(*ADD_SHORT.end()));
         let middle = if short.0 <= short.1 { middle.clamp(short.0, short.1) } else { middle };
-        let tries = || (0..=2 * TRIES_MAX).map(|i| middle + if i % 2 == 0 { -(i / 2) } else { i / 2 + 1 });
+        let tries = || {
+            let around = (0..=2 * TRIES_MAX).map(|i| middle + if i % 2 == 0 { -(i / 2) } else { i / 2 + 1 });
+            around.filter(|add| (ADD_MIN..=ADD_MAX).contains(add))
+        };
         for add in tries().filter(|add| (first..=last).contains(add)) {
             let candidate = self.candidate(add);
             if has_integer(candidate.low, candidate.high) {
@@ -218,14 +229,13 @@ impl Stabbing {
     }
 
     /// The candidate that passes the most windows from the first on.
-    fn longest(&self, adds: impl Iterator<Item = i32>) -> Fit {
-        let in_range = |add: &i32| (i32::from(i16::MIN)..=i32::from(i16::MAX)).contains(add);
+    fn longest(&self, adds: impl Iterator<Item = i64>) -> Fit {
         let mut best = (Candidate { add: 0, low: self.slits[0].0, high: self.slits[0].1 }, 1);
-        for add in adds.filter(in_range) {
+        for add in adds {
             let mut reached = Candidate { add, low: self.slits[0].0, high: self.slits[0].1 };
             let mut count = 1;
             for (x, &(low, high)) in self.slits.iter().enumerate().skip(1) {
-                let rise = 0.5 * f64::from(add) * x as f64;
+                let rise = 0.5 * add as f64 * x as f64;
                 let next =
                     Candidate { add, low: reached.low.max(low - rise), high: reached.high.min(high - rise) };
                 if !has_integer(next.low, next.high) {
