@@ -129,8 +129,9 @@ impl Stepper {
         if self.stopped {
             return Ok(None);
         }
+        let is_busy = self.is_active() || self.in_pulse;
         moves.push(&mut self.queue, StepMove { interval, count, add, forward: self.next_forward })?;
-        if self.is_active() || self.in_pulse {
+        if is_busy {
             return Ok(None);
         }
         self.load(board, moves);
