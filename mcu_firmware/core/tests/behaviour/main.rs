@@ -1,0 +1,11 @@
+//! What a host and an oscilloscope see of the firmware core: every test speaks blocks and looks at pins.
+
+mod bench;
+mod faults;
+mod homing;
+mod inputs;
+mod link;
+mod outputs;
+mod random;
+mod replay;
+mod steps;
