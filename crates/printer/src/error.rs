@@ -71,7 +71,7 @@ catalogue! {
         "A heater was switched on but did not get warmer", STOPPED_BY_HOST,
         "Check that the heater is connected and powered, and that its sensor sits firmly in the heater block or bed. Then restart the board.";
     HeaterDrifted, "heater-drifted":
-        "A heater lost its temperature although it was being heated", STOPPED_BY_HOST,
+        "A heater does not reach or hold its temperature although it is being heated", STOPPED_BY_HOST,
         "Check that the sensor has not come loose, that the heater's wires are sound, and that no fan blows at the block. Then restart the board.";
     TargetOutOfRange, "target-out-of-range":
         "A temperature outside the heater's limits was asked for", REFUSED,

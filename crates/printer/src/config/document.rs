@@ -42,6 +42,11 @@ impl Document {
         self.sections.remove(name)
     }
 
+    /// The value of one option, unparsed.
+    pub(super) fn peek(&self, section: &str, key: &str) -> Option<&Entry> {
+        self.sections.get(section)?.entries.get(key)
+    }
+
     pub(super) fn has(&self, name: &str) -> bool {
         self.sections.contains_key(name)
     }

@@ -81,22 +81,20 @@ pub(super) fn mcu(builder: &mut Builder<'_>) -> Option<McuConfig> {
     Some(McuConfig { serial: serial.or(canbus).unwrap_or_default(), baud: baud? })
 }
 
+/// Reports a machine of another kind. Its other sections mean other things, so judging them would only add noise.
+pub(super) fn is_other_kinematics(builder: &mut Builder<'_>) -> bool {
+    let Some(entry) = builder.document.peek("printer", "kinematics") else { return false };
+    if entry.value.is_empty() || entry.value == "cartesian" {
+        return false;
+    }
+    let problem = "is not supported yet: only `cartesian` machines can be driven so far";
+    builder.log.error(entry.line, format!("[printer] kinematics: `{}` {problem}", excerpt(&entry.value)));
+    true
+}
+
 pub(super) fn printer(builder: &mut Builder<'_>) -> Option<MachineConfig> {
     let mut reader = builder.required_section("printer")?;
-    let kinematics = match reader.required_text("kinematics").as_deref() {
-        None => None,
-        Some("cartesian") => Some(Kinematics::Cartesian),
-        Some(other) => {
-            reader.error(
-                "kinematics",
-                format!(
-                    "`{}` is not supported yet: only `cartesian` machines can be driven so far",
-                    excerpt(other)
-                ),
-            );
-            None
-        }
-    };
+    let kinematics = reader.required_text("kinematics").map(|_| Kinematics::Cartesian);
     let max_velocity = reader.number("max_velocity", Range::above(0.0).to(VELOCITY_MAX));
     let max_accel = reader.number("max_accel", Range::above(0.0).to(ACCEL_MAX));
     let corner = reader.number_or("square_corner_velocity", 5.0, Range::from(0.0).to(VELOCITY_MAX));

@@ -93,6 +93,9 @@ impl Builder<'_> {
 fn build(text: &str, log: &mut Log) -> Option<PrinterConfig> {
     let document = document::read(text, log);
     let mut builder = Builder { document, pins: PinRegistry::default(), log };
+    if machine::is_other_kinematics(&mut builder) {
+        return None;
+    }
     // All sections are read before the first missing one ends this, so that one reading shows every mistake.
     let mcu = machine::mcu(&mut builder);
     let printer = machine::printer(&mut builder);
@@ -120,6 +123,10 @@ fn build(text: &str, log: &mut Log) -> Option<PrinterConfig> {
         force_move: force_move?,
     })
 }
+
+/// A machine for tests.
+#[cfg(test)]
+pub(crate) const SMALL_MACHINE: &str = include_str!("small_machine.cfg");
 
 #[cfg(test)]
 mod tests;

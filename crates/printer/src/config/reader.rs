@@ -96,8 +96,16 @@ impl<'a> Reader<'a> {
         self.log.warning(line, format!("[{}] {key}: {problem}", excerpt(&self.section.name)));
     }
 
-    /// The text of an option that may be missing. One that is there but empty counts as missing.
+    /// The text of an option that may be missing. One that is there but empty is reported and counts as missing.
     pub(super) fn text(&mut self, key: &'static str) -> Option<String> {
+        let value = self.value(key);
+        if value.is_none() && self.has(key) {
+            self.warning(key, "it has no value, so the default counts; delete the line or write one");
+        }
+        value
+    }
+
+    fn value(&mut self, key: &'static str) -> Option<String> {
         self.asked.push(key);
         let value = self.section.entries.get(key)?.value.trim();
         (!value.is_empty()).then(|| value.to_owned())
@@ -105,7 +113,7 @@ impl<'a> Reader<'a> {
 
     /// The text of an option that must be there.
     pub(super) fn required_text(&mut self, key: &'static str) -> Option<String> {
-        let text = self.text(key);
+        let text = self.value(key);
         if text.is_none() {
             self.missing(key);
         }

@@ -120,7 +120,7 @@ pub(super) fn motor(reader: &mut Reader<'_>) -> Option<MotorConfig> {
 fn gear_ratio(reader: &mut Reader<'_>) -> Option<f64> {
     let Some(text) = reader.text("gear_ratio") else { return Some(1.0) };
     let mut ratio = 1.0;
-    for pair in text.split([',', '\n']).filter(|pair| !pair.trim().is_empty()) {
+    for pair in text.split([',', '\n']) {
         let teeth =
             |side: &str| side.trim().parse::<f64>().ok().filter(|teeth| *teeth > 0.0 && *teeth <= 1e6);
         let Some((driven, driving)) = pair.split_once(':').and_then(|(a, b)| Some((teeth(a)?, teeth(b)?)))

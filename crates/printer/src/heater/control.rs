@@ -5,6 +5,9 @@ use units::{Celsius, Seconds};
 /// Klipper counts PID gains in 255ths of full power.
 const KLIPPER_GAIN_SCALE: f64 = 255.0;
 
+/// Shorter smoothing would make a slope of the converter's noise, and of two samples at once a division by nothing.
+const SMOOTH_TIME_MIN_S: f64 = 0.01;
+
 /// Gains of a PID loop in Klipper's units: duty out of 255 per °C, per °C·s and per °C/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PidGains {
@@ -40,7 +43,7 @@ impl Pid {
             ki: gains.ki / KLIPPER_GAIN_SCALE,
             kd: gains.kd / KLIPPER_GAIN_SCALE,
             max_power,
-            smooth_time_s: smooth_time.0.max(0.0),
+            smooth_time_s: smooth_time.0.max(SMOOTH_TIME_MIN_S),
             integral: 0.0,
             slope_c_per_s: 0.0,
             last: None,
@@ -55,10 +58,10 @@ impl Pid {
     /// The duty (0..=max_power) after a sample taken `dt` after the one before.
     pub fn update(&mut self, temperature: Celsius, target: Celsius, dt: Seconds) -> f64 {
         let last = self.last.replace(temperature).unwrap_or(temperature);
+        // (slope now − slope so far)·dt/smooth_time, written without a division by a dt that may be tiny.
+        let window = dt.0.max(self.smooth_time_s);
         if dt.0 > 0.0 {
-            let slope = (temperature - last).0 / dt.0;
-            let share = if dt.0 < self.smooth_time_s { dt.0 / self.smooth_time_s } else { 1.0 };
-            self.slope_c_per_s += (slope - self.slope_c_per_s) * share;
+            self.slope_c_per_s += ((temperature - last).0 - self.slope_c_per_s * dt.0) / window;
         }
         if target <= Celsius::ZERO {
             return 0.0;
@@ -72,11 +75,6 @@ impl Pid {
             self.integral = integral;
         }
         duty
-    }
-
-    /// The smoothed slope of the temperature, °C/s.
-    pub const fn slope_c_per_s(&self) -> f64 {
-        self.slope_c_per_s
     }
 }
 

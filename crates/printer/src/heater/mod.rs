@@ -23,11 +23,14 @@ pub const SAMPLE_GAP_MAX: Seconds = Seconds(2.0);
 /// The board switches heaters off after 3 s without orders, so a heater that had none for longer starts anew.
 const SAMPLE_GAP_RESTART: Seconds = Seconds(3.0);
 
-/// A PID loop is at its target when it is this near …
+/// A PID heater has arrived when its averaged reading stays this near its target …
 const SETTLED_BAND: Celsius = Celsius(1.0);
 
-/// … and its temperature changes no faster than this, in °C/s.
-const SETTLED_SLOPE_C_PER_S: f64 = 0.1;
+/// … for this long …
+const SETTLED_TIME: Seconds = Seconds(3.0);
+
+/// … and moves less than this meanwhile: one that crosses the band on its way to an overshoot has not arrived.
+const SETTLED_DRIFT: Celsius = Celsius(0.4);
 
 /// What a heater does that it must not. Each is final.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +67,10 @@ pub struct Heater {
     temperature: Option<Celsius>,
     smoothed: Celsius,
     last_sample: Option<Seconds>,
+    /// When and where the averaged reading came to rest in the band around the target.
+    resting: Option<(Seconds, Celsius)>,
+    /// The target was set while the heater was already at least that warm.
+    set_from_above: bool,
     duty: f64,
     fault: Option<HeaterFault>,
 }
@@ -90,6 +97,8 @@ impl Heater {
             temperature: None,
             smoothed: Celsius::ZERO,
             last_sample: None,
+            resting: None,
+            set_from_above: false,
             duty: 0.0,
             fault: None,
             config,
@@ -121,6 +130,10 @@ impl Heater {
         {
             return Err(self.error(fault));
         }
+        if target != self.target {
+            self.resting = None;
+            self.set_from_above = self.temperature.is_some() && self.smoothed >= target - self.band();
+        }
         self.target = target;
         if target == Celsius::ZERO {
             self.switch_off();
@@ -142,14 +155,17 @@ impl Heater {
     ///
     /// On a fault the heater is off for good and this and every later call gives the fault.
     pub fn sample(&mut self, temperature: Celsius, now: Seconds) -> Result<f64, HeaterFault> {
-        let gap = self.last_sample.map_or(Seconds::ZERO, |last| (now - last).max(Seconds::ZERO));
+        // A host clock that stands still or goes back must not undo what was learnt.
+        let last = self.last_sample;
+        let now = last.map_or(now, |last| if now > last { now } else { last });
+        let gap = last.map_or(Seconds::ZERO, |last| now - last);
         if gap > SAMPLE_GAP_RESTART {
-            // Cooled behind our back: what was known of slope and climb is void.
+            // Cooled behind our back: what was known of its climb is void.
             self.verify = VerifyHeater::new(self.config.verify);
         }
         let dt = gap.min(SAMPLE_GAP_MAX);
         self.last_sample = Some(now);
-        self.note_temperature(temperature, dt);
+        self.note_temperature(temperature, now, dt);
         let fault = self.fault.or_else(|| self.judge(temperature, now, dt).err());
         if let Some(fault) = fault {
             self.fault = Some(fault);
@@ -163,7 +179,7 @@ impl Heater {
         Ok(self.duty)
     }
 
-    fn note_temperature(&mut self, temperature: Celsius, dt: Seconds) {
+    fn note_temperature(&mut self, temperature: Celsius, now: Seconds, dt: Seconds) {
         if !temperature.0.is_finite() {
             return;
         }
@@ -174,6 +190,9 @@ impl Heater {
             self.smoothed + (temperature - self.smoothed) * (dt.0 / smooth_time.0).min(1.0)
         };
         self.temperature = Some(temperature);
+        let resting = self.resting.filter(|(_, at)| (self.smoothed - *at).abs() <= SETTLED_DRIFT);
+        let is_within = (self.smoothed - self.target).abs() <= self.band();
+        self.resting = is_within.then(|| resting.unwrap_or((now, self.smoothed)));
     }
 
     fn judge(&mut self, temperature: Celsius, now: Seconds, dt: Seconds) -> Result<(), HeaterFault> {
@@ -224,35 +243,29 @@ impl Heater {
 
     /// Whether a wait for "at least the target" (M109 S, M190 S) is over. Also true when off.
     pub fn is_heated(&self) -> bool {
-        self.target <= Celsius::ZERO
-            || (self.is_within(|error| error >= -self.band().0) && !self.is_rising_past())
+        let is_above = self.set_from_above && self.smoothed >= self.target - self.band();
+        self.is_settled() || (is_above && self.fault.is_none())
     }
 
     /// Whether a wait for "the target from either side" (M109 R, M190 R) is over. Also true when off.
     pub fn is_settled(&self) -> bool {
-        self.target <= Celsius::ZERO
-            || (self.is_within(|error| error.abs() <= self.band().0) && !self.is_rising_past())
+        if self.target <= Celsius::ZERO {
+            return true;
+        }
+        let rest_time = match self.control {
+            Control::Pid(_) => SETTLED_TIME,
+            // It never rests: it swings through its band for ever.
+            Control::Watermark(_) => Seconds::ZERO,
+        };
+        let rested =
+            self.resting.zip(self.last_sample).is_some_and(|((since, _), now)| now - since >= rest_time);
+        rested && self.fault.is_none()
     }
 
-    fn is_within(&self, holds: impl Fn(f64) -> bool) -> bool {
-        self.fault.is_none() && self.temperature.is_some() && holds((self.smoothed - self.target).0)
-    }
-
-    fn band(&self) -> Celsius {
+    const fn band(&self) -> Celsius {
         match self.config.control {
             ControlConfig::Pid(_) => SETTLED_BAND,
             ControlConfig::Watermark { max_delta } => max_delta,
-        }
-    }
-
-    /// A PID heater that crosses its band at speed is not there yet: it will overshoot.
-    fn is_rising_past(&self) -> bool {
-        match &self.control {
-            Control::Pid(pid) => {
-                pid.slope_c_per_s().abs() > SETTLED_SLOPE_C_PER_S
-                    && self.smoothed < self.target + SETTLED_BAND
-            }
-            Control::Watermark(_) => false,
         }
     }
 }
