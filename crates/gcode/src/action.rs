@@ -147,7 +147,6 @@ pub enum PauseReason {
 
 /// What is to be done, in the order of the file.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Action {
     /// A straight move (`G0`, `G1`, `G10`, `G11`).
     Move(Move),

@@ -16,15 +16,72 @@ const EXACT_MAX: u64 = 1 << 53;
 ///
 /// With at most 2⁵³ as mantissa and 10²² as divisor both are exact, so that their quotient is the correctly rounded
 /// value (Clinger 1990); anything longer goes to the standard library, which rounds correctly, too.
-#[inline]
+// Inlined by force: returning a pair through memory would cost as much as reading a number.
+#[allow(clippy::inline_always)]
+#[inline(always)]
 pub(crate) fn read(bytes: &[u8], at: usize) -> Option<(f64, usize)> {
-    let mut end = at;
+    let mut first = at;
     let mut negative = false;
-    if let Some(&sign @ (b'-' | b'+')) = bytes.get(end) {
+    if let Some(&sign @ (b'-' | b'+')) = bytes.get(at) {
         negative = sign == b'-';
-        end += 1;
+        first += 1;
     }
-    let first = end;
+    let (magnitude, end) = match read_short(bytes, first) {
+        Some(found) => found,
+        None => read_any(bytes, first)?,
+    };
+    Some((if negative { -magnitude } else { magnitude }, end))
+}
+
+/// Digits and a point that end within eight bytes, as nearly all numbers of a print do, in a dozen operations on one
+/// 64-bit word instead of a loop (the sum of digits by three multiplications is known from Langdale and Lemire's work on
+/// parsing). `None` where this does not apply.
+#[allow(clippy::inline_always)]
+#[inline(always)]
+fn read_short(bytes: &[u8], at: usize) -> Option<(f64, usize)> {
+    const ONES: u64 = 0x0101_0101_0101_0101;
+    let word = if let Some(window) = bytes.get(at..at + 8).and_then(|window| window.first_chunk()) {
+        u64::from_le_bytes(*window)
+    } else {
+        // Less than eight bytes are left: those before them are shifted out, and zeros, no digits, come in.
+        let missing = 8 - bytes.len().checked_sub(at).filter(|&left| left > 0)?;
+        u64::from_le_bytes(*bytes.last_chunk()?) >> (8 * missing)
+    };
+    let digits = word ^ (ONES * u64::from(b'0'));
+    // The high bit of every byte that is no digit.
+    let others = (((digits & (ONES * 0x7f)) + ONES * 0x76) | digits) & (ONES * 0x80);
+    // Bits before the first byte that is no digit; a number that fills the window may go on behind it.
+    let whole = others.trailing_zeros() & !7;
+    if whole == 64 {
+        return None;
+    }
+    let below = (1 << whole) - 1;
+    let (packed, bits, length, divisor) = if (word >> whole) & 0xff == u64::from(b'.') {
+        let behind = (others & (others - 1)).trailing_zeros() & !7;
+        if behind == 64 {
+            return None;
+        }
+        let decimals = (behind - whole) / 8 - 1;
+        let packed = (digits & below) | ((digits >> 8) & !below);
+        (packed, behind - 8, behind / 8, POWERS_OF_TEN[decimals as usize])
+    } else {
+        (digits, whole, whole / 8, 1.0)
+    };
+    if bits == 0 {
+        return None;
+    }
+    // The last digit into the highest byte, zeros before the first.
+    let sum = packed << (64 - bits);
+    let sum = sum.wrapping_mul(10).wrapping_add(sum >> 8) & 0x00ff_00ff_00ff_00ff;
+    let sum = sum.wrapping_mul(100).wrapping_add(sum >> 16) & 0x0000_ffff_0000_ffff;
+    let sum = sum.wrapping_mul(10_000).wrapping_add(sum >> 32) & 0xffff_ffff;
+    Some((sum as f64 / divisor, at + length as usize))
+}
+
+/// Digits and a point of any length.
+#[inline(never)]
+fn read_any(bytes: &[u8], first: usize) -> Option<(f64, usize)> {
+    let mut end = first;
     let mut mantissa: u64 = 0;
     while let Some(digit) = digit_at(bytes, end) {
         mantissa = mantissa.wrapping_mul(10).wrapping_add(digit);
@@ -50,7 +107,7 @@ pub(crate) fn read(bytes: &[u8], at: usize) -> Option<(f64, usize)> {
     } else {
         read_long(&bytes[first..end])
     };
-    Some((if negative { -magnitude } else { magnitude }, end))
+    Some((magnitude, end))
 }
 
 #[inline]
@@ -101,6 +158,16 @@ mod tests {
         #[test]
         fn every_number_is_correctly_rounded(text in "[-+]?[0-9]{0,24}[.][0-9]{1,24}") {
             prop_assert_eq!(read(text.as_bytes(), 0), Some((text.parse::<f64>().unwrap(), text.len())));
+        }
+
+        #[test]
+        fn the_short_way_agrees_with_the_long_one(
+            bytes in proptest::collection::vec(prop_oneof![b'0'..=b'9', Just(b'.'), any::<u8>()], 0..20),
+            at in 0usize..20,
+        ) {
+            if let Some(found) = read_short(&bytes, at) {
+                prop_assert_eq!(Some(found), read_any(&bytes, at));
+            }
         }
 
         #[test]

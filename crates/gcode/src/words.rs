@@ -74,35 +74,24 @@ impl Words {
     pub(crate) fn scan(&mut self, bytes: &[u8], mut at: usize) -> Result<WordsEnd, WordFault> {
         self.present = 0;
         self.bare = 0;
-        let mut apart = false;
-        let mut blank = false;
         let first = at;
         while let Some(&byte) = bytes.get(at) {
             let index = (byte | 0x20).wrapping_sub(b'a');
             if index < 26 {
-                if index == b'E' - b'A' && apart && !blank {
-                    return Err(WordFault::Exponent(first.max(at - 1)..at + 1));
+                if index == b'e' - b'a' && at > first && bytes[at - 1].is_ascii_digit() {
+                    Self::check_exponent(bytes, first, at)?;
                 }
-                apart |= blank;
-                blank = false;
                 at = self.word(bytes, at, index)?;
                 continue;
             }
             match byte {
-                b' ' | b'\t' => {
-                    blank = true;
-                    at += 1;
-                }
+                b' ' | b'\t' | b'\r' => at += 1,
                 b';' => return Ok(WordsEnd { comment: Some(at), ..WordsEnd::default() }),
                 b'*' => return Ok(WordsEnd { checksum: Some(at), ..WordsEnd::default() }),
                 b'(' => match memchr::memchr(b')', &bytes[at..]) {
-                    Some(length) => {
-                        blank = true;
-                        at += length + 1;
-                    }
+                    Some(length) => at += length + 1,
                     None => return Ok(WordsEnd { unclosed: Some(at), ..WordsEnd::default() }),
                 },
-                b'\r' => at += 1,
                 _ => return Err(Self::no_letter(bytes, at)),
             }
         }
@@ -110,7 +99,8 @@ impl Words {
     }
 
     /// Reads the word at `at`, whose letter is that of `index`, and says where it ends.
-    #[inline]
+    #[allow(clippy::inline_always)] // As `number::read`.
+    #[inline(always)]
     fn word(&mut self, bytes: &[u8], at: usize, index: u8) -> Result<usize, WordFault> {
         let mask = 1 << index;
         if self.present & mask != 0 {
@@ -129,6 +119,14 @@ impl Words {
         } else {
             Err(WordFault::TooLarge(at..end))
         }
+    }
+
+    /// An `E` right behind a digit is the extruder where all words are written together, as in `G1X1E5`. Where others are
+    /// apart it may be an exponent that some program wrote.
+    #[cold]
+    fn check_exponent(bytes: &[u8], first: usize, at: usize) -> Result<(), WordFault> {
+        let apart = bytes[first..at].iter().any(|b| matches!(b, b' ' | b'\t'));
+        if apart { Err(WordFault::Exponent(at - 1..at + 1)) } else { Ok(()) }
     }
 
     #[cold]
@@ -171,10 +169,11 @@ impl Words {
         at..at + 1
     }
 
-    /// The first letter of a mask that occurs, in the alphabet's order.
+    /// The leftmost letter of a mask that occurs.
     pub(crate) fn first_of(&self, mask: u32) -> Option<u8> {
         let found = self.present & mask;
-        (found != 0).then(|| b'A' + found.trailing_zeros() as u8)
+        let letters = (b'A'..=b'Z').filter(|&letter| found & bit(letter) != 0);
+        letters.min_by_key(|&letter| self.columns[usize::from(letter - b'A')])
     }
 }
 

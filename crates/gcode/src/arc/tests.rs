@@ -1,1 +1,121 @@
+use proptest::prelude::*;
 
+use super::*;
+
+fn at(x: f64, y: f64, z: f64, e: f64) -> Position {
+    Position { x, y, z, e }
+}
+
+fn arc(from: Position, to: Position, plane: Plane, clockwise: bool, centre: Centre) -> Result<Arc, ArcError> {
+    let turn = Turn { plane, clockwise, centre, extra_turns: 0.0 };
+    Arc::new(LineNumber(1), from, to, MmPerS(10.0), turn).map(|(arc, _)| arc)
+}
+
+/// The point in the middle of the arc, which tells both its side and its direction.
+fn middle(arc: &Arc) -> [f64; 3] {
+    let [x, y, z, _] = arc.chords(Mm(1e-4)).point(0.5).to_array();
+    [x, y, z].map(|v| (v * 10.0).round() / 10.0)
+}
+
+#[test]
+fn a_quarter_turn_has_the_length_and_the_side_it_should() {
+    let quarter =
+        arc(at(10.0, 0.0, 0.0, 0.0), at(0.0, 10.0, 0.0, 1.0), Plane::Xy, false, Centre::Offset([-10.0, 0.0]));
+    let quarter = quarter.unwrap();
+    assert!((quarter.angle - PI / 2.0).abs() < 1e-12);
+    assert!((quarter.length().0 - 5.0 * PI).abs() < 1e-9);
+    assert_eq!(middle(&quarter), [7.1, 7.1, 0.0]);
+    let other_way = arc(quarter.from, quarter.to, Plane::Xy, true, Centre::Offset([-10.0, 0.0])).unwrap();
+    assert!((other_way.angle + 1.5 * PI).abs() < 1e-12);
+    assert_eq!(middle(&other_way), [-7.1, -7.1, 0.0]);
+}
+
+#[test]
+fn the_same_end_is_a_full_circle_and_turns_add_to_it() {
+    let start = at(10.0, 5.0, 1.0, 0.0);
+    let end = at(10.0, 5.0, 3.0, 0.0);
+    for (clockwise, sign) in [(true, -1.0), (false, 1.0)] {
+        let turn =
+            Turn { plane: Plane::Xy, clockwise, centre: Centre::Offset([-10.0, 0.0]), extra_turns: 2.0 };
+        let (helix, accurate) = Arc::new(LineNumber(1), start, end, MmPerS(1.0), turn).unwrap();
+        assert!(accurate && (helix.angle - sign * 3.0 * TAU).abs() < 1e-12);
+        assert_eq!(helix.chords(CHORD_TOLERANCE).last().unwrap().to, end);
+    }
+}
+
+#[test]
+fn planes_turn_as_seen_from_the_end_of_their_normals() {
+    // In Z-X, from +Z a quarter turn counter-clockwise ends at +X; in Y-Z, from +Y at +Z.
+    let zx =
+        arc(at(0.0, 0.0, 1.0, 0.0), at(1.0, 0.0, 0.0, 0.0), Plane::Zx, false, Centre::Offset([-1.0, 0.0]));
+    assert!((zx.unwrap().angle - PI / 2.0).abs() < 1e-12);
+    let yz =
+        arc(at(0.0, 1.0, 0.0, 0.0), at(0.0, 0.0, 1.0, 0.0), Plane::Yz, false, Centre::Offset([-1.0, 0.0]));
+    assert!((yz.unwrap().angle - PI / 2.0).abs() < 1e-12);
+}
+
+#[test]
+fn the_sign_of_a_radius_chooses_between_the_short_and_the_long_way() {
+    let (from, to) = (at(10.0, 0.0, 0.0, 0.0), at(0.0, 10.0, 0.0, 0.0));
+    for (clockwise, radius, angle) in
+        [(false, 10.0, 0.5 * PI), (true, 10.0, -0.5 * PI), (false, -10.0, 1.5 * PI), (true, -10.0, -1.5 * PI)]
+    {
+        let arc = arc(from, to, Plane::Xy, clockwise, Centre::Radius(radius)).unwrap();
+        assert!((arc.angle - angle).abs() < 1e-9, "{clockwise} {radius}: {}", arc.angle);
+    }
+    // A half circle whose radius was rounded down.
+    let half =
+        arc(at(0.0, 0.0, 0.0, 0.0), at(20.0, 0.0, 0.0, 0.0), Plane::Xy, true, Centre::Radius(9.999)).unwrap();
+    assert!((half.angle + PI).abs() < 1e-9);
+}
+
+#[test]
+fn what_is_no_arc_is_said() {
+    let (o, p) = (at(0.0, 0.0, 0.0, 0.0), at(10.0, 0.0, 0.0, 0.0));
+    let xy = |to, centre| arc(o, to, Plane::Xy, true, centre).unwrap_err();
+    assert_eq!(xy(p, Centre::Offset([0.0, 0.0])), ArcError::NoRadius);
+    assert_eq!(xy(p, Centre::Offset([2.0, 0.0])), ArcError::RadiiDiffer(2.0, 8.0));
+    assert_eq!(xy(p, Centre::Offset([10.0, 0.0])), ArcError::RadiiDiffer(10.0, 0.0));
+    assert_eq!(xy(o, Centre::Radius(5.0)), ArcError::FullCircleByRadius);
+    assert_eq!(xy(p, Centre::Radius(3.0)), ArcError::RadiusTooSmall);
+    assert_eq!(xy(p, Centre::Radius(1e9)), ArcError::RadiusTooLarge);
+    assert_eq!(xy(p, Centre::Offset([1e9, 0.0])), ArcError::RadiusTooLarge);
+}
+
+proptest! {
+    #[test]
+    fn chords_stay_within_the_tolerance_and_join_up(
+        radius in 0.01f64..500.0,
+        start in -PI..PI,
+        sweep in 0.01f64..6.25,
+        clockwise: bool,
+        rise in -5.0f64..5.0,
+        tolerance in 0.0005f64..0.5,
+    ) {
+        let turned = start + if clockwise { -sweep } else { sweep };
+        let from = at(radius * start.cos(), radius * start.sin(), 0.0, 5.0);
+        let to = at(radius * turned.cos(), radius * turned.sin(), rise, 6.0);
+        let arc = arc(from, to, Plane::Xy, clockwise, Centre::Offset([-from.x, -from.y])).unwrap();
+        prop_assert!((arc.angle.abs() - sweep).abs() < 1e-6);
+        let mut last = from;
+        let mut filament = 0.0;
+        for chord in arc.chords(Mm(tolerance)) {
+            prop_assert_eq!(chord.from, last);
+            last = chord.to;
+            filament += chord.to.e - chord.from.e;
+            let middle = libm::hypot(chord.from.x.midpoint(chord.to.x), chord.from.y.midpoint(chord.to.y));
+            prop_assert!((radius - middle).abs() <= tolerance * 1.000_001 + 1e-9);
+            prop_assert!((libm::hypot(chord.to.x, chord.to.y) - radius).abs() < 1e-9);
+        }
+        prop_assert_eq!(last, to);
+        prop_assert!((filament - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn no_more_chords_than_the_tolerance_needs(radius in 1.0f64..100.0) {
+        let from = at(radius, 0.0, 0.0, 0.0);
+        let circle = arc(from, from, Plane::Xy, true, Centre::Offset([-radius, 0.0])).unwrap();
+        let step = 2.0 * (1.0 - 0.005 / radius).acos();
+        prop_assert!(circle.chords(CHORD_TOLERANCE).count() as f64 <= (TAU / step).ceil() + 1.0);
+    }
+}

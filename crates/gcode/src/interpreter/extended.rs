@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use units::{Celsius, MmPerS, MmPerS2, Seconds};
 
-use super::{Interpreter, Out};
+use super::{Interpreter, Out, Said};
 use crate::action::{Action, Heater, ObjectAction, ObjectId, PauseReason, VelocityLimit, Wait};
 use crate::annotation::text_of;
 use crate::diagnostic::DiagnosticCode;
@@ -129,19 +129,19 @@ impl Interpreter {
             return out.say(Error, DiagnosticCode::MalformedWord, place, message);
         }
         let call = Call { name, columns, list: &list };
-        if let Some(action) = self.call(&call, out) {
+        if let Ok(Some(action)) = self.call(&call, out) {
             out.act(action);
         }
     }
 
-    fn call(&mut self, call: &Call<'_>, out: &mut Out<'_>) -> Option<Action> {
-        Some(match call.name {
+    fn call(&mut self, call: &Call<'_>, out: &mut Out<'_>) -> Result<Option<Action>, Said> {
+        Ok(Some(match call.name {
             "SET_VELOCITY_LIMIT" => Action::VelocityLimit(self.velocity_limit(call, out)?),
             "SET_PRESSURE_ADVANCE" => Action::PressureAdvance {
                 advance: call.number("ADVANCE", 0.0..=1e3, out)?,
                 smooth_time: call.number("SMOOTH_TIME", 0.0..=0.2, out)?.map(Seconds),
             },
-            "EXCLUDE_OBJECT_DEFINE" => Action::Object(call.define_object(out)?),
+            "EXCLUDE_OBJECT_DEFINE" => return Ok(call.define_object(out)?.map(Action::Object)),
             "EXCLUDE_OBJECT_START" => Action::Object(ObjectAction::Start(call.required_object(out)?)),
             "EXCLUDE_OBJECT_END" => Action::Object(ObjectAction::End(call.object())),
             "EXCLUDE_OBJECT" => {
@@ -149,7 +149,7 @@ impl Interpreter {
                 let current = call.get("CURRENT").is_some_and(|p| p.value == b"1");
                 match call.object() {
                     id if reset => Action::Object(ObjectAction::Restore(id)),
-                    None if !current => return None, // A report.
+                    None if !current => return Ok(None), // A report.
                     id => Action::Object(ObjectAction::Cancel(id)),
                 }
             }
@@ -165,7 +165,7 @@ impl Interpreter {
             },
             "TURN_OFF_HEATERS" => Action::TurnOffHeaters,
             "ACTIVATE_EXTRUDER" => {
-                let Heater::Tool(tool) = call.heater("EXTRUDER", out)? else { return None };
+                let Heater::Tool(tool) = call.heater("EXTRUDER", out)? else { return Ok(None) };
                 self.tool = tool;
                 Action::SelectTool(tool)
             }
@@ -173,11 +173,11 @@ impl Interpreter {
             "GET_POSITION" => Action::ReportPosition,
             "PAUSE" => Action::Pause(PauseReason::Requested),
             "CANCEL_PRINT" => Action::Cancel,
-            _ => return None,
-        })
+            _ => return Ok(None),
+        }))
     }
 
-    fn velocity_limit(&mut self, call: &Call<'_>, out: &mut Out<'_>) -> Option<VelocityLimit> {
+    fn velocity_limit(&mut self, call: &Call<'_>, out: &mut Out<'_>) -> Result<VelocityLimit, Said> {
         let positive = f64::MIN_POSITIVE..=1e9;
         let velocity = call.number("VELOCITY", positive.clone(), out)?.map(MmPerS);
         let accel = call.number("ACCEL", positive.clone(), out)?;
@@ -199,7 +199,7 @@ impl Interpreter {
                 ),
             }
         }
-        Some(VelocityLimit {
+        Ok(VelocityLimit {
             velocity,
             accel: accel.map(MmPerS2),
             square_corner_velocity,
@@ -252,16 +252,16 @@ impl Call<'_> {
         self.list.iter().find(|p| p.is(key))
     }
 
-    /// A parameter's number. The outer `None` says that it was wrong, the inner that there is none.
+    /// A parameter's number.
     fn number(
         &self,
         key: &str,
         range: core::ops::RangeInclusive<f64>,
         out: &mut Out<'_>,
-    ) -> Option<Option<f64>> {
-        let Some(parameter) = self.get(key) else { return Some(None) };
+    ) -> Result<Option<f64>, Said> {
+        let Some(parameter) = self.get(key) else { return Ok(None) };
         match parameter.number() {
-            Some(value) if range.contains(&value) => Some(Some(value)),
+            Some(value) if range.contains(&value) => Ok(Some(value)),
             found => {
                 let code = if found.is_some() {
                     DiagnosticCode::ValueOutOfRange
@@ -271,66 +271,64 @@ impl Call<'_> {
                 let text = text_of(parameter.value);
                 let message = format!("`{text}` is no value for {key}. The line is skipped.");
                 out.say(Error, code, parameter.start..parameter.end, message);
-                None
+                Err(Said)
             }
         }
     }
 
     /// `extruder`, `extruder1`, `heater_bed`.
-    fn heater(&self, key: &str, out: &mut Out<'_>) -> Option<Heater> {
-        let Some(parameter) = self.get(key) else {
-            let message = format!("{} needs {key}=. The line is skipped.", self.name);
-            out.say(Error, DiagnosticCode::MissingValue, self.columns.clone(), message);
-            return None;
-        };
-        let heater = match parameter.value {
-            b"heater_bed" => Some(Heater::Bed),
-            b"extruder" => Some(Heater::Tool(0)),
-            other => other
-                .strip_prefix(b"extruder")
-                .map(|digits| super::digits(digits, 0))
-                .and_then(|(tool, end)| tool.filter(|_| end == other.len() - 8))
-                .map(Heater::Tool),
-        };
-        if heater.is_none() {
-            let message = format!(
-                "`{}` is no heater that is known here. The line would be skipped: remove it, or confirm.",
-                text_of(parameter.value)
-            );
-            out.say(Blocking, DiagnosticCode::UnsupportedCommand, parameter.start..parameter.end, message);
+    fn heater(&self, key: &str, out: &mut Out<'_>) -> Result<Heater, Said> {
+        let parameter = self.required(key, out)?;
+        match parameter.value {
+            b"heater_bed" => return Ok(Heater::Bed),
+            b"extruder" => return Ok(Heater::Tool(0)),
+            other => {
+                if let Some(rest) = other.strip_prefix(b"extruder")
+                    && let (Some(tool), end) = super::digits(rest, 0)
+                    && end == rest.len()
+                {
+                    return Ok(Heater::Tool(tool));
+                }
+            }
         }
-        heater
+        let message = format!(
+            "`{}` is no heater that is known here. The line would be skipped: remove it, or confirm.",
+            text_of(parameter.value)
+        );
+        out.say(Blocking, DiagnosticCode::UnsupportedCommand, parameter.start..parameter.end, message);
+        Err(Said)
+    }
+
+    fn required(&self, key: &str, out: &mut Out<'_>) -> Result<&Parameter<'_>, Said> {
+        self.get(key).ok_or_else(|| {
+            let message = format!("{} needs {key}=. The line is skipped; slice the file again.", self.name);
+            out.say(Error, DiagnosticCode::MissingValue, self.columns.clone(), message);
+            Said
+        })
     }
 
     fn object(&self) -> Option<ObjectId> {
-        // Whole, since names must stay distinct; the line bounds them.
-        self.get("NAME").map(|p| ObjectId::Name(String::from_utf8_lossy(p.value).into_owned()))
+        self.get("NAME").map(object_id)
     }
 
-    fn required_object(&self, out: &mut Out<'_>) -> Option<ObjectId> {
-        let object = self.object();
-        if object.is_none() {
-            let message = format!("{} needs NAME=. The line is skipped.", self.name);
-            out.say(Error, DiagnosticCode::MissingValue, self.columns.clone(), message);
-        }
-        object
+    fn required_object(&self, out: &mut Out<'_>) -> Result<ObjectId, Said> {
+        self.required("NAME", out).map(object_id)
     }
 
-    fn define_object(&self, out: &mut Out<'_>) -> Option<ObjectAction> {
+    fn define_object(&self, out: &mut Out<'_>) -> Result<Option<ObjectAction>, Said> {
         if self.get("RESET").is_some_and(|p| p.value == b"1") {
-            return None;
+            return Ok(None);
         }
         let id = self.required_object(out)?;
-        let centre = match self.get("CENTER") {
-            Some(p) => match *points(p.value) {
-                [centre] => Some(centre),
-                _ => None,
-            },
-            None => None,
-        };
+        let centre = self.get("CENTER").and_then(|p| points(p.value).first().copied());
         let polygon = self.get("POLYGON").map(|p| points(p.value)).unwrap_or_default();
-        Some(ObjectAction::Define { id, label: None, centre, polygon })
+        Ok(Some(ObjectAction::Define { id, label: None, centre, polygon }))
     }
+}
+
+/// Whole, since names must stay distinct; the line's length bounds them.
+fn object_id(parameter: &Parameter<'_>) -> ObjectId {
+    ObjectId::Name(String::from_utf8_lossy(parameter.value).into_owned())
 }
 
 /// Pairs of numbers out of `1,2` or `[[1,2],[3,4]]`, up to what is none.

@@ -2,7 +2,7 @@
 
 use units::{Celsius, Mm, MmPerS, MmPerS2};
 
-use super::{Code, FACTOR_RANGE, INDEX_MAX, Interpreter, Out};
+use super::{Code, FACTOR_RANGE, INDEX_MAX, Interpreter, Out, Said, unknown};
 use crate::action::{
     Action, AxisValues, Heater, MachineLimits, ObjectAction, ObjectId, PauseReason, VelocityLimit, Wait,
 };
@@ -11,28 +11,28 @@ use crate::diagnostic::DiagnosticCode;
 use crate::diagnostic::Severity::{Blocking, Error, Info};
 use crate::words::{bit, bits};
 
-/// Commands whose absence changes nothing in a print from this host: reports, power panic, progress, model checks, motors
-/// on (they are whenever they move), sounds, lights, stored settings. Sorted.
-const HARMLESS: [u32; 39] = [
-    17, 20, 21, 22, 27, 31, 73, 75, 76, 77, 78, 85, 108, 111, 113, 115, 118, 119, 120, 121, 150, 155, 211,
-    300, 355, 413, 415, 500, 501, 502, 503, 504, 555, 569, 575, 862, 863, 876, 928,
+/// Commands whose absence changes nothing in a print from this host: motors on (they are whenever they move), card,
+/// progress and timers, model checks, reports, sensors that are not there, sounds, lights, stored settings. Sorted.
+const HARMLESS: [u32; 35] = [
+    17, 20, 21, 22, 27, 31, 73, 74, 75, 76, 77, 78, 85, 108, 111, 113, 115, 118, 119, 145, 149, 150, 155,
+    211, 300, 355, 412, 413, 500, 501, 502, 503, 555, 862, 876,
 ];
 
-/// Settings of another firmware's insides: passed over, with a word.
-const IGNORED: [u32; 9] = [92, 210, 301, 302, 304, 309, 570, 593, 851];
+/// Settings of another firmware's insides (steps, PID, currents, shapers, jerk): passed over, with a word. Sorted.
+const IGNORED: [u32; 18] =
+    [92, 301, 302, 304, 309, 350, 566, 569, 570, 593, 851, 906, 907, 908, 911, 913, 914, 915];
 
 /// Targets beyond this are a mistake (tungsten would still be solid).
 const CELSIUS_MAX: f64 = 2000.0;
 
 impl Interpreter {
-    #[allow(clippy::too_many_lines)] // A table, read from top to bottom.
     pub(super) fn m(&mut self, code: Code, bytes: &[u8], out: &mut Out<'_>) {
-        // `M862.3 P "MK3S"`: texts that are no words.
+        // Not even their words are read: `M862.3 P "MK3S"` has texts.
         if HARMLESS.binary_search(&code.number).is_ok() {
             return;
         }
         if code.sub.is_some() {
-            return self.unknown(code, bytes, out);
+            return unknown(code, bytes, out);
         }
         match code.number {
             0 | 1 | 25 | 226 | 601 => out.act(Action::Pause(PauseReason::Requested)),
@@ -40,56 +40,51 @@ impl Interpreter {
             18 | 84 => self.with_words(code, bytes, u32::MAX, out, |it, out| it.motors_off(code, out)),
             82 => self.relative_e = false,
             83 => self.relative_e = true,
-            104 => self.temperature(code, bytes, Wait::No, out),
+            104 | 140 | 141 => self.temperature(code, bytes, Wait::No, out),
             109 | 190 | 191 => self.temperature(code, bytes, Wait::UntilHeated, out),
-            140 | 141 => self.temperature(code, bytes, Wait::No, out),
             105 => out.act(Action::ReportTemperatures),
-            106 => self.with_words(code, bytes, 0, out, super::Interpreter::fan),
-            107 => self.with_words(code, bytes, 0, out, |it, out| {
-                if let Some(index) = it.index(b'P', out) {
-                    out.act(Action::Fan { index: index.unwrap_or(0) as u8, speed: 0.0 });
-                }
-            }),
+            106 | 107 => self.with_words(code, bytes, 0, out, |it, out| it.fan(code, out)),
             110 => self.with_words(code, bytes, 0, out, |it, _| {
-                if let Some(number) = it.words.get(b'N') {
-                    it.last_number = Some(number as i64);
-                }
+                it.last_number = it.words.get(b'N').map_or(it.last_number, |number| Some(number as i64));
             }),
             112 => out.act(Action::EmergencyStop),
             114 => out.act(Action::ReportPosition),
             117 => {
-                let text = &bytes[code.end..memchr::memchr(b';', bytes).unwrap_or(bytes.len()).max(code.end)];
-                out.act(Action::Message(text_of(text.trim_ascii())));
+                let end = memchr::memchr(b';', bytes).unwrap_or(bytes.len());
+                out.act(Action::Message(text_of(bytes[code.end..end.max(code.end)].trim_ascii())));
             }
-            200 => self.with_words(code, bytes, 0, out, |it, out| it.volumetric(code, out)),
-            201 | 203 | 205 => self.with_words(code, bytes, 0, out, |it, out| it.machine_limits(code, out)),
-            204 => self.with_words(code, bytes, 0, out, |it, out| it.acceleration(code, out)),
-            207 | 208 => self.with_words(code, bytes, 0, out, |it, out| it.retraction_settings(code, out)),
-            209 => self.with_words(code, bytes, 0, out, |it, out| {
-                if it.words.get(b'S').is_some_and(|s| s != 0.0) {
-                    it.unknown(code, bytes, out);
-                }
-            }),
-            220 => self.with_words(code, bytes, bits(b"BR"), out, super::Interpreter::speed_percent),
-            221 => self.with_words(code, bytes, 0, out, super::Interpreter::flow_percent),
             400 => out.act(Action::WaitForMoves),
             486 => self.objects(code, bytes, out),
-            572 => self.with_words(code, bytes, 0, out, |it, out| it.linear_advance(b'S', code, out)),
-            900 => self.with_words(code, bytes, 0, out, |it, out| it.linear_advance(b'K', code, out)),
-            number if IGNORED.contains(&number) => {
+            _ => self.m_setting(code, bytes, out),
+        }
+    }
+
+    fn m_setting(&mut self, code: Code, bytes: &[u8], out: &mut Out<'_>) {
+        let then: fn(&mut Self, Code, &mut Out<'_>) = match code.number {
+            200 => Self::volumetric,
+            201 | 203 | 205 => Self::machine_limits,
+            204 => Self::acceleration,
+            207 | 208 => Self::retraction_settings,
+            209 => Self::automatic_retraction,
+            220 => Self::speed_percent,
+            221 => Self::flow_percent,
+            572 | 900 => Self::linear_advance,
+            number if IGNORED.binary_search(&number).is_ok() => {
                 let message = format!(
                     "M{number} sets up another firmware and is passed over: the printer's configuration counts."
                 );
-                out.say(Info, DiagnosticCode::IgnoredSetting, code.columns(), message);
+                return out.say(Info, DiagnosticCode::IgnoredSetting, code.columns(), message);
             }
-            _ => self.unknown(code, bytes, out),
-        }
+            _ => return unknown(code, bytes, out),
+        };
+        let bare_allowed = if code.number == 220 { bits(b"BR") } else { 0 };
+        self.with_words(code, bytes, bare_allowed, out, |it, out| then(it, code, out));
     }
 
     /// `T0`
     pub(super) fn t(&mut self, code: Code, bytes: &[u8], out: &mut Out<'_>) {
         if f64::from(code.number) > INDEX_MAX || code.sub.is_some() {
-            return self.unknown(code, bytes, out);
+            return unknown(code, bytes, out);
         }
         self.with_words(code, bytes, 0, out, |it, out| {
             it.unused_words(0, out);
@@ -98,28 +93,16 @@ impl Interpreter {
         });
     }
 
-    /// A command that is not known may have been what heats or homes: it blocks.
-    #[cold]
-    pub(super) fn unknown(&mut self, code: Code, bytes: &[u8], out: &mut Out<'_>) {
-        let name = String::from_utf8_lossy(&bytes[code.columns()]).into_owned();
-        let message = format!(
-            "`{name}` is not known here and would be skipped. Remove it from the slicer's custom G-code, or confirm that the \
-             print is right without it."
-        );
-        out.say(Blocking, DiagnosticCode::UnknownCommand, code.columns(), message);
-    }
-
-    /// A letter's number where it is a count; the outer `None` says that it was wrong, the inner that there is none.
-    fn index(&mut self, letter: u8, out: &mut Out<'_>) -> Option<Option<u32>> {
-        let Some(value) = self.words.get(letter) else { return Some(None) };
-        let max = if letter == b'P' { 255.0 } else { INDEX_MAX };
-        if (0.0..=max).contains(&value) && value % 1.0 == 0.0 {
-            return Some(Some(value as u32));
+    /// A letter's number where it is a count.
+    fn index(&self, letter: u8, out: &mut Out<'_>) -> Result<Option<u32>, Said> {
+        let Some(value) = self.words.get(letter) else { return Ok(None) };
+        if (0.0..=INDEX_MAX).contains(&value) && value % 1.0 == 0.0 {
+            return Ok(Some(value as u32));
         }
-        let letter_name = char::from(letter);
-        let message = format!("`{letter_name}` must be a whole number from 0 to {max}. The line is skipped.");
+        let name = char::from(letter);
+        let message = format!("`{name}` must be a whole number from 0 to {INDEX_MAX}. The line is skipped.");
         out.say(Error, DiagnosticCode::ValueOutOfRange, self.words.columns(letter), message);
-        None
+        Err(Said)
     }
 
     fn missing(code: Code, words: &str, out: &mut Out<'_>) {
@@ -133,8 +116,8 @@ impl Interpreter {
         }
         let heater = match code.number {
             104 | 109 => match self.index(b'T', out) {
-                Some(tool) => Heater::Tool(tool.unwrap_or(self.tool)),
-                None => return,
+                Ok(tool) => Heater::Tool(tool.unwrap_or(self.tool)),
+                Err(Said) => return,
             },
             140 | 190 => Heater::Bed,
             _ => Heater::Chamber,
@@ -156,10 +139,15 @@ impl Interpreter {
         }
     }
 
-    fn fan(&mut self, out: &mut Out<'_>) {
-        let Some(index) = self.index(b'P', out) else { return };
-        let speed = (self.words.get(b'S').unwrap_or(255.0) / 255.0).clamp(0.0, 1.0);
-        out.act(Action::Fan { index: index.unwrap_or(0) as u8, speed });
+    fn fan(&mut self, code: Code, out: &mut Out<'_>) {
+        let Ok(index) = self.index(b'P', out) else { return };
+        let Ok(index) = u8::try_from(index.unwrap_or(0)) else {
+            let message = "No printer has so many fans. The line is skipped; slice the file again.";
+            return out.say(Error, DiagnosticCode::ValueOutOfRange, self.words.columns(b'P'), message);
+        };
+        let on = if code.number == 106 { 1.0 } else { 0.0 };
+        let speed = on * (self.words.get(b'S').unwrap_or(255.0) / 255.0).clamp(0.0, 1.0);
+        out.act(Action::Fan { index, speed });
     }
 
     fn motors_off(&mut self, code: Code, out: &mut Out<'_>) {
@@ -177,11 +165,20 @@ impl Interpreter {
 
     /// `M200`: only switching volumetric extrusion off can be done by doing nothing.
     fn volumetric(&mut self, code: Code, out: &mut Out<'_>) {
-        let off = self.words.get(b'S') == Some(0.0) || self.words.get(b'D').unwrap_or(0.0) == 0.0;
-        if !off {
+        let on = self.words.get(b'S').or(self.words.get(b'D')).is_some_and(|value| value != 0.0);
+        if on {
             let message = "Volumetric extrusion is not available: far too much or too little would be fed. Switch it off in \
                            the slicer (`Use volumetric E`).";
             out.say(Error, DiagnosticCode::UnsupportedCommand, code.columns(), message);
+        }
+    }
+
+    /// `M209`: only switching it off can be done by doing nothing.
+    fn automatic_retraction(&mut self, code: Code, out: &mut Out<'_>) {
+        if self.words.get(b'S').is_some_and(|s| s != 0.0) {
+            let message = "Automatic retraction is not available. Let the slicer retract, or confirm that the print is right \
+                           without it.";
+            out.say(Blocking, DiagnosticCode::UnsupportedCommand, code.columns(), message);
         }
     }
 
@@ -264,7 +261,7 @@ impl Interpreter {
         None
     }
 
-    fn speed_percent(&mut self, out: &mut Out<'_>) {
+    fn speed_percent(&mut self, _: Code, out: &mut Out<'_>) {
         if self.words.has(b'B') {
             self.stored_speed_factor = self.speed_factor;
         }
@@ -275,7 +272,7 @@ impl Interpreter {
         }
     }
 
-    fn flow_percent(&mut self, out: &mut Out<'_>) {
+    fn flow_percent(&mut self, _: Code, out: &mut Out<'_>) {
         if let Some(factor) = self.percent(out) {
             self.set_flow_factor(factor);
             out.act(Action::FlowFactor(self.flow_factor));
@@ -283,7 +280,8 @@ impl Interpreter {
     }
 
     /// `M900 K` (Marlin) and `M572 S` (`RepRapFirmware`) in seconds, as pressure advance is.
-    fn linear_advance(&mut self, letter: u8, code: Code, out: &mut Out<'_>) {
+    fn linear_advance(&mut self, code: Code, out: &mut Out<'_>) {
+        let letter = if code.number == 572 { b'S' } else { b'K' };
         match self.words.get(letter) {
             Some(advance) if (0.0..=2.0).contains(&advance) => {
                 out.act(Action::PressureAdvance { advance: Some(advance), smooth_time: None });
@@ -312,38 +310,42 @@ impl Interpreter {
         if !self.read_words(&bytes[..end], code, bit(b'C'), out) {
             return;
         }
-        let started = match self.words.get(b'S') {
-            Some(value) if value < 0.0 => {
-                out.act(Action::Object(ObjectAction::End(None)));
-                None
-            }
-            _ => match self.index(b'S', out) {
-                Some(started) => started,
-                None => return,
-            },
+        if let Ok(list) = self.object_actions(label, out) {
+            list.into_iter().flatten().for_each(|action| out.act(Action::Object(action)));
+        }
+    }
+
+    fn object_actions(
+        &self,
+        label: Option<String>,
+        out: &mut Out<'_>,
+    ) -> Result<[Option<ObjectAction>; 6], Said> {
+        let by_index = |index: Option<u32>| index.map(ObjectId::Index);
+        let none_starts = self.words.get(b'S').is_some_and(|value| value < 0.0);
+        let started = if none_starts { None } else { self.index(b'S', out)? };
+        let define = by_index(started).filter(|_| label.is_some()).map(|id| ObjectAction::Define {
+            id,
+            label,
+            centre: None,
+            polygon: Vec::new(),
+        });
+        let start = if none_starts {
+            Some(ObjectAction::End(None))
+        } else {
+            by_index(started).map(ObjectAction::Start)
         };
-        if let (Some(index), Some(_)) = (started, &label) {
-            let id = ObjectId::Index(index);
-            out.act(Action::Object(ObjectAction::Define { id, label, centre: None, polygon: Vec::new() }));
-        }
-        if let Some(index) = started {
-            out.act(Action::Object(ObjectAction::Start(ObjectId::Index(index))));
-        }
-        let count = self.index(b'T', out).flatten().map(ObjectAction::Count);
-        let cancel = self.index(b'P', out).flatten().map(|i| ObjectAction::Cancel(Some(ObjectId::Index(i))));
+        let count = self.index(b'T', out)?.map(ObjectAction::Count);
+        let cancel = by_index(self.index(b'P', out)?).map(|id| ObjectAction::Cancel(Some(id)));
         let current = self.words.has(b'C').then_some(ObjectAction::Cancel(None));
-        let restore =
-            self.index(b'U', out).flatten().map(|i| ObjectAction::Restore(Some(ObjectId::Index(i))));
-        for action in [count, cancel, current, restore].into_iter().flatten() {
-            out.act(Action::Object(action));
-        }
+        let restore = by_index(self.index(b'U', out)?).map(|id| ObjectAction::Restore(Some(id)));
+        Ok([count, define, start, cancel, current, restore])
     }
 }
 
 #[cfg(test)]
 mod tests {
     #[test]
-    fn the_list_of_harmless_commands_is_sorted() {
-        assert!(super::HARMLESS.is_sorted());
+    fn the_lists_of_commands_are_sorted() {
+        assert!(super::HARMLESS.is_sorted() && super::IGNORED.is_sorted());
     }
 }

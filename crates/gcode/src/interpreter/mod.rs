@@ -131,10 +131,13 @@ impl Out<'_> {
     }
 }
 
+/// What is wrong has been said.
+#[derive(Clone, Copy, Debug)]
+struct Said;
+
 /// The letter and number that begin a line.
 #[derive(Clone, Copy, Debug)]
 struct Code {
-    letter: u8,
     number: u32,
     /// What follows a point: 1 in `G92.1`.
     sub: Option<u32>,
@@ -175,8 +178,8 @@ impl Interpreter {
         }
     }
 
-    /// Reads one line, without its line end. Actions and diagnostics are appended in order: at most three actions (beside
-    /// those of comments) and a handful of diagnostics a line.
+    /// Reads one line, without its line end. Actions and diagnostics are appended in order, a handful
+    /// at most.
     pub fn line(
         &mut self,
         line: LineNumber,
@@ -200,7 +203,7 @@ impl Interpreter {
             b'A'..=b'Z' | b'a'..=b'z' | b'_' => self.command(bytes, at, &mut out),
             b';' => {
                 annotation::read(&bytes[at + 1..], &mut self.in_thumbnail, |a| {
-                    out.act(Action::Annotation(a))
+                    out.act(Action::Annotation(a));
                 });
             }
             _ => self.odd(bytes, at, &mut out),
@@ -275,7 +278,7 @@ impl Interpreter {
         let Some(number) = number else {
             return self.extended(bytes, at, out);
         };
-        let mut code = Code { letter, number, sub: None, start: at, end };
+        let mut code = Code { number, sub: None, start: at, end };
         match bytes.get(end) {
             Some(b'.') => {
                 let (sub, end) = digits(bytes, end + 1);
@@ -290,7 +293,7 @@ impl Interpreter {
             b'G' => self.g(code, bytes, out),
             b'M' => self.m(code, bytes, out),
             b'T' => self.t(code, bytes, out),
-            _ => self.extended(bytes, at, out),
+            _ => unknown(code, bytes, out),
         }
     }
 
@@ -309,6 +312,17 @@ impl Interpreter {
             }
         }
     }
+}
+
+/// A command that is not known may have been what heats or homes: it blocks.
+#[cold]
+fn unknown(code: Code, bytes: &[u8], out: &mut Out<'_>) {
+    let name = String::from_utf8_lossy(&bytes[code.columns()]).into_owned();
+    let message = format!(
+        "`{name}` is not known here and would be skipped. Remove it from the slicer's custom G-code, or confirm that the \
+         print is right without it."
+    );
+    out.say(Severity::Blocking, DiagnosticCode::UnknownCommand, code.columns(), message);
 }
 
 /// A whole number of up to nine digits, and the place behind it.

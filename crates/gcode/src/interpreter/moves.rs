@@ -2,7 +2,7 @@
 
 use units::{MmPerS, Seconds};
 
-use super::{Code, FILAMENT_MAX_MM, INCH_MM, Interpreter, Out, POSITION_MAX_MM};
+use super::{Code, FILAMENT_MAX_MM, FirmwareRetraction, INCH_MM, Interpreter, Out, POSITION_MAX_MM};
 use crate::action::{Action, Position};
 use crate::arc::{Arc, ArcError, Centre, Plane, TURNS_MAX, Turn};
 use crate::diagnostic::DiagnosticCode;
@@ -40,7 +40,7 @@ impl Interpreter {
             (90, None) => self.relative = false,
             (91, None) => self.relative = true,
             (92, None) => self.with_words(code, bytes, 0, out, |it, out| it.set_position(axes, out)),
-            (92, Some(1)) => self.offset[..3].fill(0.0),
+            (92, Some(1)) => self.offset[..3].copy_from_slice(&[0.0, 0.0, self.hop]),
             // Machine coordinates are all there is; feed is per minute, and exact stop and blending are the planner's.
             (53 | 61 | 64 | 94, None) => {}
             (29 | 30 | 32 | 33 | 34 | 35 | 80, _) => {
@@ -48,7 +48,7 @@ impl Interpreter {
                                by hand, then confirm.";
                 out.say(Blocking, DiagnosticCode::UnsupportedCommand, code.columns(), message);
             }
-            _ => self.unknown(code, bytes, out),
+            _ => super::unknown(code, bytes, out),
         }
     }
 
@@ -70,9 +70,7 @@ impl Interpreter {
     #[inline]
     fn linear(&mut self, rapid: bool, out: &mut Out<'_>) {
         const KNOWN: u32 = bits(b"XYZEF");
-        if self.words.present() & !KNOWN != 0 {
-            self.unused_words(KNOWN, out);
-        }
+        self.unused_words(KNOWN, out);
         if !self.take_feed(out) || self.words.present() & bits(AXES) == 0 {
             return;
         }
@@ -202,9 +200,6 @@ impl Interpreter {
                 self.offset[axis] = self.position[axis] - value * self.scale[axis];
             }
         }
-        if all || self.words.has(b'Z') {
-            self.hop = 0.0;
-        }
     }
 
     /// `G10`: draws the filament back. The file's own E and Z stay as they are, so both offsets take part.
@@ -261,14 +256,15 @@ impl Interpreter {
     /// Says which word of the line a command has no use for.
     #[inline]
     pub(super) fn unused_words(&self, known: u32, out: &mut Out<'_>) {
+        if self.words.present() & !known == 0 {
+            return;
+        }
         if let Some(letter) = self.words.first_of(!known) {
             let message = format!("`{}` has no meaning here and is passed over.", char::from(letter));
             out.say(Warning, DiagnosticCode::UnusedWord, self.words.columns(letter), message);
         }
     }
 }
-
-use super::FirmwareRetraction;
 
 fn arc_error(error: ArcError) -> String {
     match error {
