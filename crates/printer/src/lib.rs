@@ -3,11 +3,15 @@
 //! Bytes and time are arguments: `receive(bytes, now)`, `poll(now)`. Knows nothing of ports, files, threads or clocks,
 //! so the same code runs in a browser's worker, in the native command and in tests in virtual time.
 
+pub mod check;
 pub mod clock_sync;
 pub mod config;
 pub mod error;
 pub mod heater;
 pub mod identify;
 pub mod link;
+pub mod machine;
 pub mod move_queue;
+pub mod planner;
+pub mod session;
 pub mod thermistor;

@@ -1,0 +1,80 @@
+//! From a machine file to what the planner needs: limits, motors, step distances.
+//!
+//! Knows the order of motors, which is the same everywhere: X, Y, Z, extruder.
+
+use motion::{ExtruderLimits, Limits};
+use steps::{Cartesian, StepGenerator, StepperSpec};
+use units::{Hertz, Mm, MmPerS, MmPerS2, Seconds};
+
+use crate::{
+    config::PrinterConfig,
+    error::{ErrorCode, PrinterError},
+};
+
+/// How many motors a machine has: three axes and the extruder (which never moves where there is none).
+pub const MOTORS: usize = 4;
+
+/// The motors' names, as in the machine file.
+pub const MOTOR_NAMES: [&str; MOTORS] = ["stepper_x", "stepper_y", "stepper_z", "extruder"];
+
+/// The index of the extruder's motor.
+pub const EXTRUDER: usize = 3;
+
+/// How far a step may be from its exact time, either way (and never more than half the gap to its neighbours).
+pub const STEP_ERROR_MAX: Seconds = Seconds(25e-6);
+
+/// A stand-in where a machine has no extruder: no move reaches it.
+const NO_EXTRUDER_STEP_MM: Mm = Mm(1.0);
+
+/// The distance that one step moves each motor's axis.
+pub fn step_distances(config: &PrinterConfig) -> [Mm; MOTORS] {
+    let [x, y, z] = config.steppers.each_ref().map(|axis| axis.motor.step_distance());
+    let e = config.extruder.as_ref().map_or(NO_EXTRUDER_STEP_MM, |extruder| extruder.motor.step_distance());
+    [x, y, z, e]
+}
+
+/// The planner's limits.
+pub fn limits(config: &PrinterConfig) -> Limits {
+    let printer = &config.printer;
+    let extruder = config.extruder.as_ref().map_or(
+        ExtruderLimits {
+            max_extrude_only_velocity: MmPerS(f64::from(u16::MAX)),
+            max_extrude_only_accel: MmPerS2(f64::from(u16::MAX)),
+            instantaneous_corner_velocity: MmPerS(1.0),
+        },
+        |extruder| ExtruderLimits {
+            max_extrude_only_velocity: extruder.max_extrude_only_velocity,
+            max_extrude_only_accel: extruder.max_extrude_only_accel,
+            instantaneous_corner_velocity: extruder.instantaneous_corner_velocity,
+        },
+    );
+    Limits {
+        max_velocity: printer.max_velocity,
+        max_accel: printer.max_accel,
+        square_corner_velocity: printer.square_corner_velocity,
+        minimum_cruise_ratio: printer.minimum_cruise_ratio,
+        max_z_velocity: printer.max_z_velocity,
+        max_z_accel: printer.max_z_accel,
+        extruder,
+    }
+}
+
+/// A step generator for the machine's motors.
+pub fn step_generator(config: &PrinterConfig, clock: Hertz) -> Result<StepGenerator, PrinterError> {
+    let specs =
+        step_distances(config).map(|step_distance| StepperSpec { step_distance, max_error: STEP_ERROR_MAX });
+    StepGenerator::new(clock, &specs, Cartesian)
+        .map_err(|error| PrinterError::new(ErrorCode::ConfigInvalid, error.to_string()))
+}
+
+/// What the G-code reader has to know of the machine.
+pub fn gcode_settings(config: &PrinterConfig) -> gcode::Settings {
+    let retraction = config.firmware_retraction.as_ref().map(|retraction| gcode::FirmwareRetraction {
+        length: retraction.retract_length.0,
+        speed: retraction.retract_speed,
+        extra_length: retraction.unretract_extra_length.0,
+        unretract_speed: retraction.unretract_speed,
+        z_hop: 0.0,
+    });
+    gcode::Settings { retraction }
+}

@@ -1,0 +1,143 @@
+//! What the machine file allows: nothing reaches a motor that has not passed here.
+//!
+//! Knows positions and limits, not speeds (the look-ahead keeps those) and not temperatures (it is told whether the
+//! nozzle may extrude). Positions are machine coordinates in mm, the extruder in mm of filament.
+
+use gcode::Move;
+
+use crate::{config::PrinterConfig, error::{ErrorCode, PrinterError}};
+
+/// Names of the axes in messages.
+const AXES: [&str; 3] = ["X", "Y", "Z"];
+
+/// How far beyond a limit still counts as on it, in mm: the dust of decimal arithmetic, far below a step.
+const LIMIT_SLACK_MM: f64 = 1e-6;
+
+/// Whether the nozzle may push filament.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ExtrusionPermit {
+    /// It is hot enough (or cold extrusion is allowed by `min_extrude_temp: 0`).
+    Allowed,
+    /// It is colder than `min_extrude_temp`.
+    TooCold {
+        /// Its temperature, °C.
+        celsius: f64,
+    },
+}
+
+/// Judges moves before they are planned.
+#[derive(Clone, Debug)]
+pub struct Guard {
+    limits_mm: [(f64, f64); 3],
+    homed: [bool; 3],
+    extruder: Option<ExtruderGuard>,
+    /// Kept up to date by the owner.
+    pub extrusion: ExtrusionPermit,
+}
+
+#[derive(Clone, Debug)]
+struct ExtruderGuard {
+    filament_area_mm2: f64,
+    cross_section_max_mm2: f64,
+    extrude_only_max_mm: f64,
+    min_extrude_celsius: f64,
+}
+
+impl Guard {
+    /// The limits of a machine file; no axis is homed yet.
+    pub fn new(config: &PrinterConfig) -> Self {
+        let limits_mm = config.steppers.each_ref().map(|axis| (axis.position_min.0, axis.position_max.0));
+        let extruder = config.extruder.as_ref().map(|extruder| ExtruderGuard {
+            filament_area_mm2: extruder.filament_area_mm2(),
+            cross_section_max_mm2: extruder.max_extrude_cross_section,
+            extrude_only_max_mm: extruder.max_extrude_only_distance.0,
+            min_extrude_celsius: extruder.heater.min_extrude_temp.0,
+        });
+        let cold_allowed = extruder.as_ref().is_none_or(|extruder: &ExtruderGuard| extruder.min_extrude_celsius <= 0.0);
+        let extrusion =
+            if cold_allowed { ExtrusionPermit::Allowed } else { ExtrusionPermit::TooCold { celsius: 0.0 } };
+        Self { limits_mm, homed: [false; 3], extruder, extrusion }
+    }
+
+    /// Which axes have a known position.
+    pub const fn homed(&self) -> [bool; 3] {
+        self.homed
+    }
+
+    /// Sets whether an axis' position is known.
+    pub fn set_homed(&mut self, axis: usize, homed: bool) {
+        self.homed[axis] = homed;
+    }
+
+    /// Why this move may not be made, if so.
+    pub fn judge(&self, mv: &Move) -> Result<(), PrinterError> {
+        let from = [mv.from.x, mv.from.y, mv.from.z];
+        let to = [mv.to.x, mv.to.y, mv.to.z];
+        for axis in 0..3 {
+            if from[axis] == to[axis] {
+                continue;
+            }
+            if !self.homed[axis] {
+                let detail = format!("axis {} has not been homed", AXES[axis]);
+                return Err(PrinterError::new(ErrorCode::NotHomed, detail).at_line(mv.line.0));
+            }
+            let (min, max) = self.limits_mm[axis];
+            if !(min - LIMIT_SLACK_MM..=max + LIMIT_SLACK_MM).contains(&to[axis]) {
+                let detail = format!(
+                    "{} {:.3} mm lies outside {min:.3} to {max:.3} mm",
+                    AXES[axis], to[axis]
+                );
+                return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(mv.line.0));
+            }
+        }
+        self.judge_extrusion(mv)
+    }
+
+    fn judge_extrusion(&self, mv: &Move) -> Result<(), PrinterError> {
+        let filament = mv.to.e - mv.from.e;
+        if filament == 0.0 {
+            return Ok(());
+        }
+        let fail = |code, detail: String| Err(PrinterError::new(code, detail).at_line(mv.line.0));
+        let Some(extruder) = &self.extruder else {
+            return fail(ErrorCode::NoSuchHeater, "the machine file has no [extruder]".into());
+        };
+        if let ExtrusionPermit::TooCold { celsius } = self.extrusion {
+            let wanted = extruder.min_extrude_celsius;
+            return fail(
+                ErrorCode::ColdExtrusion,
+                format!("the nozzle is at {celsius:.0} °C, below min_extrude_temp ({wanted:.0} °C)"),
+            );
+        }
+        let travel = [mv.to.x - mv.from.x, mv.to.y - mv.from.y, mv.to.z - mv.from.z];
+        let length = libm::sqrt(travel.iter().map(|d| d * d).sum());
+        if length == 0.0 {
+            if filament.abs() > extruder.extrude_only_max_mm {
+                return fail(
+                    ErrorCode::ExtrusionTooLong,
+                    format!(
+                        "{filament:.1} mm of filament without travel, max_extrude_only_distance is {:.1} mm",
+                        extruder.extrude_only_max_mm
+                    ),
+                );
+            }
+        } else if filament > 0.0 {
+            let area = filament / length * extruder.filament_area_mm2;
+            // Dabs shorter than a nozzle's bore are how slicers prime and wipe: their ratio means nothing.
+            let dab = filament * extruder.filament_area_mm2 <= extruder.cross_section_max_mm2 * DAB_MM;
+            if area > extruder.cross_section_max_mm2 && !dab {
+                return fail(
+                    ErrorCode::ExtrusionTooThick,
+                    format!(
+                        "{area:.2} mm² of plastic along the path, max_extrude_cross_section is {:.2} mm²",
+                        extruder.cross_section_max_mm2
+                    ),
+                );
+            }
+        }
+        Ok(())
+    }
+}
+
+/// See [`Guard::judge`]: extrusion over less than this travel is not judged by its ratio, in mm.
+const DAB_MM: f64 = 0.4;

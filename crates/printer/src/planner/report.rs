@@ -1,0 +1,184 @@
+//! What a plan amounts to: times, steps and the bytes that would travel, without any board.
+
+use motion::PlannedMove;
+use steps::{StepCommand, StepCommandKind};
+use units::{Hertz, Seconds};
+use wire::{
+    Command,
+    block::{Block, PAYLOAD_BYTES_MAX},
+};
+
+use super::{Barrier, Planned, Planner, Source};
+use crate::{
+    config::PrinterConfig,
+    error::PrinterError,
+    machine::{EXTRUDER, MOTORS},
+};
+
+/// The clock for which a plan's bytes are stated.
+pub const PLAN_CLOCK: Hertz = Hertz(12_000_000);
+
+/// One motor's share of a plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotorReport {
+    /// Steps in both directions together.
+    pub steps: u64,
+    /// `queue_step` messages.
+    pub queue_steps: u64,
+    /// The highest step rate, in steps per second.
+    pub peak_steps_per_s: f64,
+}
+
+/// What a file takes on a machine.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlanReport {
+    /// From the first move to the last, waits for temperatures not counted.
+    pub print_time: Seconds,
+    /// Moves with a length.
+    pub moves: u64,
+    /// Per motor, in the order of [`crate::machine::MOTOR_NAMES`].
+    pub motors: [MotorReport; MOTORS],
+    /// Bytes of all motion messages, in whole blocks as sent.
+    pub bytes: u64,
+    /// The worst distance of any step from its exact time.
+    pub step_error_max: Seconds,
+    /// Filament pushed less filament pulled back, in mm.
+    pub filament_mm: f64,
+}
+
+/// Plans a source without a board and packs the step commands into the blocks that would be sent. Homing takes no time
+/// and no steps: the homed axes are at 0 then. Heaters are taken to be where they should.
+#[derive(Debug)]
+pub struct PlanStream {
+    planner: Planner,
+    source: Source,
+    payload: Vec<u8>,
+    sequence: u8,
+    report: PlanReport,
+}
+
+impl PlanStream {
+    /// A plan for a machine.
+    pub fn new(config: &PrinterConfig) -> Result<Self, PrinterError> {
+        let mut planner = Planner::new(config, PLAN_CLOCK)?;
+        planner.guard.extrusion = super::ExtrusionPermit::Allowed;
+        let mut source = Source::default();
+        planner.adopt(&mut source);
+        Ok(Self {
+            planner,
+            source,
+            payload: Vec::with_capacity(PAYLOAD_BYTES_MAX),
+            sequence: 0,
+            report: PlanReport::default(),
+        })
+    }
+
+    /// How many bytes of G-code may be fed now.
+    pub fn wants(&self) -> usize {
+        self.source.wants()
+    }
+
+    /// Takes G-code and appends the blocks that follow from it to `blocks`; each planned move goes to `each_move`.
+    pub fn feed(
+        &mut self,
+        gcode: &[u8],
+        blocks: &mut Vec<u8>,
+        each_move: impl FnMut(&PlannedMove),
+    ) -> Result<(), PrinterError> {
+        self.source.feed(gcode);
+        self.run(blocks, each_move)
+    }
+
+    /// Says that the file has ended, and tells what it amounts to.
+    pub fn finish(
+        mut self,
+        blocks: &mut Vec<u8>,
+        each_move: impl FnMut(&PlannedMove),
+    ) -> Result<PlanReport, PrinterError> {
+        self.source.end();
+        self.run(blocks, each_move)?;
+        self.send(blocks);
+        let stats = self.planner.generator().stats();
+        for (motor, stats) in self.report.motors.iter_mut().zip(stats) {
+            *motor = MotorReport {
+                steps: stats.steps,
+                queue_steps: stats.queue_steps,
+                peak_steps_per_s: stats.peak_steps_per_s,
+            };
+            self.report.step_error_max = self.report.step_error_max.max(stats.max_error);
+        }
+        Ok(self.report)
+    }
+
+    fn run(&mut self, blocks: &mut Vec<u8>, mut each_move: impl FnMut(&PlannedMove)) -> Result<(), PrinterError> {
+        loop {
+            match self.planner.next(&mut self.source)? {
+                Planned::NeedsInput | Planned::EndOfSource => return Ok(()),
+                Planned::Move(planned) => {
+                    self.report.moves += 1;
+                    self.report.filament_mm += planned.to[EXTRUDER] - planned.from[EXTRUDER];
+                    each_move(&planned);
+                }
+                Planned::Steps(command) => self.pack(&command, blocks),
+                Planned::RunStarted(_) => {
+                    for motor in 0..MOTORS {
+                        self.pack_message(&Command::ResetStepClock { oid: motor as u8, clock: 0 }, blocks);
+                    }
+                }
+                Planned::RunEnded(at) => self.report.print_time += at,
+                Planned::Barrier { barrier, .. } => self.pass(&barrier),
+                Planned::Timed { .. } | Planned::Notice(_) => {}
+            }
+        }
+    }
+
+    fn pass(&mut self, barrier: &Barrier) {
+        match barrier {
+            Barrier::Home(axes) => {
+                for axis in (0..3).filter(|&axis| axes[axis]) {
+                    self.planner.set_axis(axis, 0.0, true);
+                }
+                let at = |axis: usize| axes[axis].then_some(0.0);
+                self.source.interpreter.set_axes(at(0), at(1), at(2));
+            }
+            Barrier::Dwell(duration) => self.report.print_time += *duration,
+            Barrier::WaitTemperature { .. }
+            | Barrier::MotorsOff(_)
+            | Barrier::WaitForMoves
+            | Barrier::WaitForTemperature { .. }
+            | Barrier::Pause(_)
+            | Barrier::Cancel
+            | Barrier::EmergencyStop => {}
+        }
+    }
+
+    fn pack(&mut self, command: &StepCommand, blocks: &mut Vec<u8>) {
+        let oid = command.motor as u8;
+        let message = match command.kind {
+            StepCommandKind::SetDir { forward } => Command::SetNextStepDir { oid, dir: u8::from(forward) },
+            StepCommandKind::QueueStep { interval, count, add } => Command::QueueStep { oid, interval, count, add },
+        };
+        self.pack_message(&message, blocks);
+    }
+
+    fn pack_message(&mut self, message: &Command<'_>, blocks: &mut Vec<u8>) {
+        let before = self.payload.len();
+        message.encode(&mut self.payload);
+        if self.payload.len() > PAYLOAD_BYTES_MAX {
+            let message = self.payload.split_off(before);
+            self.send(blocks);
+            self.payload.extend_from_slice(&message);
+        }
+    }
+
+    fn send(&mut self, blocks: &mut Vec<u8>) {
+        if self.payload.is_empty() {
+            return;
+        }
+        let block = Block::new(self.sequence, &self.payload);
+        self.sequence = self.sequence.wrapping_add(1);
+        self.report.bytes += block.as_bytes().len() as u64;
+        blocks.extend_from_slice(block.as_bytes());
+        self.payload.clear();
+    }
+}

@@ -1,0 +1,105 @@
+//! One stream of G-code with its own modal state: a job's file, or what a user types.
+
+use std::collections::VecDeque;
+
+use gcode::{Action, Diagnostic, Interpreter, LineNumber, Lines, Move, Settings};
+
+/// The most bytes a source holds before it says that it wants no more.
+pub const SOURCE_BYTES_MAX: usize = 64 * 1024;
+
+/// A stream of G-code: fed in chunks, read line by line.
+#[derive(Debug)]
+pub struct Source {
+    lines: Lines,
+    ended: bool,
+    /// The modal state.
+    pub interpreter: Interpreter,
+    actions: Vec<Action>,
+    next_action: usize,
+    diagnostics: Vec<Diagnostic>,
+    /// The chords of an arc that is being drawn.
+    pub(super) chords: VecDeque<Move>,
+    line: LineNumber,
+}
+
+/// What a source has next.
+#[derive(Debug)]
+pub(super) enum Next {
+    Action(Action),
+    Diagnostic(Diagnostic),
+    NeedsInput,
+    End,
+}
+
+impl Default for Source {
+    fn default() -> Self {
+        Self::new(Settings::default())
+    }
+}
+
+impl Source {
+    /// A source that starts with the usual modal state (absolute, millimetres).
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            lines: Lines::new(),
+            ended: false,
+            interpreter: Interpreter::new(settings),
+            actions: Vec::new(),
+            next_action: 0,
+            diagnostics: Vec::new(),
+            chords: VecDeque::new(),
+            line: LineNumber(0),
+        }
+    }
+
+    /// How many bytes may be fed now.
+    pub fn wants(&self) -> usize {
+        if self.ended { 0 } else { SOURCE_BYTES_MAX.saturating_sub(self.lines.buffered()) }
+    }
+
+    /// Takes the next bytes of the stream.
+    pub fn feed(&mut self, bytes: &[u8]) {
+        self.lines.feed(bytes);
+    }
+
+    /// Says that no more bytes come: a last line without a line break counts.
+    pub fn end(&mut self) {
+        self.lines.end();
+        self.ended = true;
+    }
+
+    /// The line that was read last.
+    pub const fn line(&self) -> LineNumber {
+        self.line
+    }
+
+    /// Forgets everything that was fed and not yet read.
+    pub fn clear(&mut self) {
+        self.lines = Lines::new();
+        self.actions.clear();
+        self.next_action = 0;
+        self.diagnostics.clear();
+        self.chords.clear();
+    }
+
+    /// The next thing in the stream.
+    pub(super) fn next(&mut self) -> Next {
+        loop {
+            if let Some(diagnostic) = self.diagnostics.pop() {
+                return Next::Diagnostic(diagnostic);
+            }
+            if let Some(action) = self.actions.get_mut(self.next_action) {
+                self.next_action += 1;
+                return Next::Action(core::mem::replace(action, Action::WaitForMoves));
+            }
+            self.actions.clear();
+            self.next_action = 0;
+            let Some(line) = self.lines.next() else {
+                return if self.ended { Next::End } else { Next::NeedsInput };
+            };
+            self.line = line.number;
+            self.interpreter.line(line.number, line.bytes, &mut self.actions, &mut self.diagnostics);
+            self.diagnostics.reverse();
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! The board as the rest of the session sees it: commands out, clocks both ways.
+//!
+//! Joins link, dictionary, clock and layout; knows nothing of what the commands are for.
+
+use units::{Hertz, Seconds, Ticks};
+use wire::{Command, dictionary::Dictionary};
+
+use super::layout::Layout;
+use crate::{
+    clock_sync::ClockSync,
+    link::{Lane, Link, Outgoing},
+};
+
+/// How far ahead of its clock an output is set: several round trips, so that a retransmission does not come too late.
+pub(super) const OUTPUT_LEAD: Seconds = Seconds(0.4);
+/// How far ahead a run of motion starts on a link that works …
+const RUN_LEAD: Seconds = Seconds(0.25);
+/// … and on one that has been losing blocks.
+const RUN_LEAD_LOSSY: Seconds = Seconds(1.2);
+
+/// A link counts as lossy for this long after it last had to send something again.
+const LOSSY_FOR: Seconds = Seconds(30.0);
+
+/// A board that has been identified.
+#[derive(Debug)]
+pub(super) struct Board {
+    pub(super) link: Link,
+    pub(super) dictionary: Dictionary,
+    pub(super) sync: ClockSync,
+    pub(super) clock: Hertz,
+    pub(super) adc_max: f64,
+    pub(super) layout: Layout,
+    pub(super) losses: Losses,
+}
+
+/// When the link last had to send something again.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Losses {
+    seen: u64,
+    last: Option<Seconds>,
+}
+
+impl Board {
+    /// The board's clock now, as far as it is known.
+    pub(super) fn clock_at(&self, now: Seconds) -> Ticks {
+        self.sync.clock_at(now)
+    }
+
+    /// A duration in ticks of the nominal clock: what every plan is made in.
+    pub(super) fn ticks(&self, duration: Seconds) -> Ticks {
+        self.clock.ticks_in(duration)
+    }
+
+    /// The clock at which an output that is to change "now" changes.
+    pub(super) fn output_clock(&self, now: Seconds) -> Ticks {
+        self.clock_at(now) + self.ticks(OUTPUT_LEAD)
+    }
+
+    /// The clock at which a run of motion that is to start "now" starts.
+    pub(super) fn run_clock(&self, now: Seconds) -> Ticks {
+        let lossy = self.losses.last.is_some_and(|last| now - last < LOSSY_FOR);
+        let lead = if lossy { RUN_LEAD_LOSSY } else { RUN_LEAD };
+        self.clock_at(now) + self.ticks(lead)
+    }
+
+    /// Notes whether the link has been losing blocks.
+    pub(super) fn note_losses(&mut self, now: Seconds) {
+        let seen = self.link.stats().retransmissions;
+        if seen != self.losses.seen {
+            self.losses = Losses { seen, last: Some(now) };
+        }
+    }
+
+    /// Sends a command ahead of all motion.
+    pub(super) fn control(&mut self, command: &Command<'_>) {
+        self.send(Lane::Control, command, |message| message);
+    }
+
+    /// Sends a command that takes effect at a clock and holds an entry of the move queue until then.
+    pub(super) fn control_at(&mut self, command: &Command<'_>, clock: Ticks) {
+        self.send(Lane::Control, command, |message| message.due(clock).entry_until(clock));
+    }
+
+    /// Sends a command ahead of everything.
+    pub(super) fn immediate(&mut self, command: &Command<'_>) {
+        self.send(Lane::Immediate, command, |message| message);
+    }
+
+    /// Sends a command of a motor's, in order: what it is for happens at `due`, and until `entry_until` it holds an
+    /// entry of the move queue.
+    pub(super) fn motion(&mut self, motor: usize, command: &Command<'_>, due: Ticks, entry_until: Option<Ticks>) {
+        self.send(Lane::Motion(motor as u8), command, |message| match entry_until {
+            Some(end) => message.due(due).entry_until(end),
+            None => message.due(due),
+        });
+    }
+
+    fn send(&mut self, lane: Lane, command: &Command<'_>, shape: impl FnOnce(Outgoing) -> Outgoing) {
+        // The layout has checked every command against the dictionary, and every lane is only filled while it has
+        // room; a control lane that overflows all the same belongs to a link that is dead, which is noticed there.
+        if let Ok(message) = Outgoing::command(lane, &self.dictionary, command) {
+            let _ = self.link.queue(shape(message));
+        }
+    }
+}

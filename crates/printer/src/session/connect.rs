@@ -1,0 +1,217 @@
+//! From a port to a machine that is ready: dictionary, clock, configuration.
+
+use units::{Hertz, Seconds};
+use wire::{
+    Command,
+    dictionary::{Dictionary, Received},
+    Response,
+};
+
+use super::{
+    board::{Board, Losses},
+    event::Event,
+    inbox::{self, Message},
+    layout::Layout,
+};
+use crate::{
+    clock_sync::{ClockRequest, ClockSync},
+    config::PrinterConfig,
+    error::{ErrorCode, PrinterError},
+    identify::{Identify, IdentifyError},
+    link::{Lane, Link, Outgoing},
+};
+
+/// Questions that are not answered are asked again after this long.
+const ASK_AGAIN: Seconds = Seconds(0.25);
+/// A board that was asked to restart gets this long before it is spoken to.
+pub(super) const RESTART: Seconds = Seconds(1.0);
+/// Converters' full scale where the board does not say.
+const ADC_MAX_DEFAULT: f64 = 4095.0;
+
+/// Reading the dictionary.
+#[derive(Debug)]
+pub(super) struct Identifying {
+    link: Link,
+    bootstrap: Dictionary,
+    identify: Identify,
+    not_before: Seconds,
+}
+
+impl Identifying {
+    pub(super) fn new(not_before: Seconds) -> Self {
+        Self { link: Link::new(), bootstrap: Dictionary::bootstrap(), identify: Identify::new(), not_before }
+    }
+
+    pub(super) fn receive(&mut self, bytes: &[u8], now: Seconds) -> Result<Option<Dictionary>, PrinterError> {
+        let Self { link, bootstrap, identify, .. } = self;
+        let mut result = Ok(None);
+        link.receive(bytes, now, |payload| {
+            let mut rest = payload.bytes;
+            while let Ok(Received::Known(Response::IdentifyResponse { offset, data })) = bootstrap.decode(&mut rest) {
+                match identify.receive(offset, data, now) {
+                    Ok(None) => {}
+                    Ok(Some(dictionary)) => result = Ok(Some(dictionary)),
+                    Err(error) => result = Err(identify_error(&error)),
+                }
+            }
+        });
+        result
+    }
+
+    pub(super) fn poll(&mut self, now: Seconds, out: &mut Vec<u8>) -> Result<Seconds, PrinterError> {
+        if now < self.not_before {
+            return Ok(self.not_before);
+        }
+        if let Some(request) = self.identify.poll(now).map_err(|error| identify_error(&error))? {
+            let command = Command::Identify { offset: request.offset, count: request.count };
+            if let Ok(message) = Outgoing::command(Lane::Control, &self.bootstrap, &command) {
+                let _ = self.link.queue(message);
+            }
+        }
+        let wake = self.link.poll(now, units::Ticks(0), out);
+        let ask = self.identify.next_wake().unwrap_or(now);
+        Ok(wake.map_or(ask, |wake| wake.min(ask)))
+    }
+
+    pub(super) fn into_link(self) -> Link {
+        self.link
+    }
+}
+
+fn identify_error(error: &IdentifyError) -> PrinterError {
+    let code = match error {
+        IdentifyError::Silent => ErrorCode::BoardSilent,
+        IdentifyError::TooLarge | IdentifyError::Dictionary(_) => ErrorCode::DictionaryInvalid,
+    };
+    PrinterError::new(code, error.to_string())
+}
+
+/// What is being waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// The state of the configuration and a clock that can be trusted.
+    State,
+    /// The configuration to be taken in.
+    Sent,
+}
+
+/// What came of it.
+#[derive(Debug)]
+pub(super) enum Outcome {
+    Pending(Seconds),
+    /// The machine is set up.
+    Ready,
+    /// The board has been set up by somebody else: it has to start anew.
+    NeedsRestart,
+    /// The board is in shutdown for this reason.
+    Shutdown(u16),
+}
+
+/// Setting up a board that has been identified.
+#[derive(Debug)]
+pub(super) struct Connecting {
+    pub(super) board: Board,
+    step: Step,
+    asked: Option<Seconds>,
+    config: Option<Message>,
+}
+
+impl Connecting {
+    pub(super) fn new(link: Link, dictionary: Dictionary, config: &PrinterConfig) -> Result<(Self, Event), PrinterError> {
+        let wrong = |detail: &str| PrinterError::new(ErrorCode::DictionaryIncomplete, detail);
+        let clock_freq = dictionary.number("CLOCK_FREQ").ok_or_else(|| wrong("the board does not tell CLOCK_FREQ"))?;
+        if !(1000.0..=1e9).contains(&clock_freq) {
+            return Err(wrong("the board's CLOCK_FREQ makes no sense"));
+        }
+        let layout = Layout::new(config, &dictionary, clock_freq)?;
+        let clock = Hertz(clock_freq as u32);
+        let event = Event::Identified {
+            version: dictionary.version.clone(),
+            mcu: dictionary.text("MCU").unwrap_or_default(),
+            clock_freq,
+        };
+        let mut board = Board {
+            link,
+            sync: ClockSync::new(clock),
+            clock,
+            adc_max: dictionary.number("ADC_MAX").unwrap_or(ADC_MAX_DEFAULT),
+            dictionary,
+            layout,
+            losses: Losses::default(),
+        };
+        if let Some(window) = board.dictionary.number("RECEIVE_WINDOW") {
+            board.link.set_receive_window(window as usize);
+        }
+        Ok((Self { board, step: Step::State, asked: None, config: None }, event))
+    }
+
+    pub(super) fn receive(&mut self, bytes: &[u8], now: Seconds) {
+        for (message, sent) in inbox::receive(&mut self.board.link, &self.board.dictionary, bytes, now) {
+            match message {
+                Message::Clock(low) => self.board.sync.clock(low, sent, now),
+                Message::Uptime { high, low } => self.board.sync.uptime(high, low, sent, now),
+                Message::Config { .. } | Message::Shutdown { .. } => self.config = Some(message),
+                _ => {}
+            }
+        }
+    }
+
+    pub(super) fn poll(&mut self, now: Seconds, out: &mut Vec<u8>) -> Result<Outcome, PrinterError> {
+        if self.board.sync.is_silent(now) {
+            return Err(ErrorCode::BoardSilent.into());
+        }
+        ask_clock(&mut self.board, now);
+        match self.config.take() {
+            Some(Message::Shutdown { reason }) => return Ok(Outcome::Shutdown(reason)),
+            // The reason follows as the answer to a command that is not carried out in that state.
+            Some(Message::Config { is_shutdown: true, .. }) => self.board.control(&Command::AllocateOids { count: 0 }),
+            Some(Message::Config { is_config, crc, move_count, .. }) => {
+                if let Some(outcome) = self.advance(is_config, crc, move_count)? {
+                    return Ok(outcome);
+                }
+            }
+            _ => {}
+        }
+        let idle = self.step == Step::State || self.board.link.is_idle();
+        if idle && self.asked.is_none_or(|asked| now - asked >= ASK_AGAIN) {
+            self.asked = Some(now);
+            self.board.control(&Command::GetConfig {});
+        }
+        let clock_now = self.board.clock_at(now);
+        let wake = self.board.link.poll(now, clock_now, out);
+        let ask = self.board.sync.next_wake().min(now + ASK_AGAIN);
+        Ok(Outcome::Pending(wake.map_or(ask, |wake| wake.min(ask))))
+    }
+
+    fn advance(&mut self, is_config: bool, crc: u32, move_count: u16) -> Result<Option<Outcome>, PrinterError> {
+        match self.step {
+            Step::State if is_config => Ok(Some(Outcome::NeedsRestart)),
+            Step::State if self.board.sync.is_settled() => {
+                let commands = self.board.layout.commands.clone();
+                for command in &commands {
+                    self.board.control(command);
+                }
+                let crc = self.board.layout.crc;
+                self.board.control(&Command::FinalizeConfig { crc });
+                self.step = Step::Sent;
+                Ok(None)
+            }
+            Step::Sent if is_config && crc == self.board.layout.crc => {
+                let clock = self.board.clock;
+                self.board.link.set_board(clock, move_count);
+                Ok(Some(Outcome::Ready))
+            }
+            Step::Sent if is_config => Err(ErrorCode::ConfigMismatch.into()),
+            Step::State | Step::Sent => Ok(None),
+        }
+    }
+}
+
+/// Asks the board for its clock when that is due.
+pub(super) fn ask_clock(board: &mut Board, now: Seconds) {
+    match board.sync.poll(now) {
+        Some(ClockRequest::Uptime) => board.control(&Command::GetUptime {}),
+        Some(ClockRequest::Clock) => board.control(&Command::GetClock {}),
+        None => {}
+    }
+}

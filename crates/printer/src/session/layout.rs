@@ -1,0 +1,220 @@
+//! How a machine file is laid out on a board: which oid is what, and the commands that say so.
+//!
+//! Knows names of pins and the board's dictionary, no time and no state.
+
+use units::{Oid, Seconds};
+use wire::{
+    Command,
+    dictionary::{Dictionary, DictionaryError},
+    messages::CommandKind,
+};
+
+use crate::{
+    config::{HeaterConfig, PinSpec, PrinterConfig, Pull},
+    error::{ErrorCode, PrinterError},
+    machine::MOTORS,
+};
+
+/// Every command without which a machine cannot be run.
+const NEEDED: &[CommandKind] = &[
+    CommandKind::AllocateOids,
+    CommandKind::GetConfig,
+    CommandKind::FinalizeConfig,
+    CommandKind::GetClock,
+    CommandKind::GetUptime,
+    CommandKind::EmergencyStop,
+    CommandKind::ConfigStepper,
+    CommandKind::QueueStep,
+    CommandKind::SetNextStepDir,
+    CommandKind::ResetStepClock,
+    CommandKind::StepperGetPosition,
+    CommandKind::StepperStopOnTrigger,
+    CommandKind::ConfigTrsync,
+    CommandKind::TrsyncStart,
+    CommandKind::TrsyncSetTimeout,
+    CommandKind::TrsyncTrigger,
+    CommandKind::ConfigEndstop,
+    CommandKind::EndstopQueryState,
+    CommandKind::EndstopHome,
+    CommandKind::ConfigAnalogIn,
+    CommandKind::QueryAnalogIn,
+    CommandKind::ConfigDigitalOut,
+    CommandKind::SetDigitalOutPwmCycle,
+    CommandKind::QueueDigitalOut,
+    CommandKind::UpdateDigitalOut,
+];
+
+/// How long a heater stays on without being refreshed, as the board itself watches it.
+pub(crate) const HEATER_MAX_DURATION: Seconds = Seconds(3.0);
+
+/// A motor's objects.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StepperOids {
+    pub(super) stepper: Oid,
+    pub(super) invert_dir: bool,
+    pub(super) enable: Option<Output>,
+}
+
+/// A switched or pulsed output.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Output {
+    pub(super) oid: Oid,
+    pub(super) inverted: bool,
+    /// The period of its pulses in ticks; 0 for one that is only on or off.
+    pub(super) cycle_ticks: u32,
+}
+
+impl Output {
+    /// What `queue_digital_out` has to say for a share of time between 0 and 1.
+    pub(super) fn on_ticks(self, duty: f64) -> u32 {
+        let duty = if duty.is_finite() { duty.clamp(0.0, 1.0) } else { 0.0 };
+        let duty = if self.inverted { 1.0 - duty } else { duty };
+        let full = f64::from(self.cycle_ticks.max(1));
+        libm::round(duty * full) as u32
+    }
+}
+
+/// An axis' switch and the trigger that it fires.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EndstopOids {
+    pub(super) endstop: Oid,
+    pub(super) trsync: Oid,
+    pub(super) inverted: bool,
+}
+
+/// A heater's sensor and its power.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HeaterOids {
+    pub(super) sensor: Oid,
+    pub(super) power: Output,
+}
+
+/// Which object is what.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    pub(super) steppers: [Option<StepperOids>; MOTORS],
+    pub(super) endstops: [EndstopOids; 3],
+    pub(super) extruder: Option<HeaterOids>,
+    pub(super) bed: Option<HeaterOids>,
+    pub(super) fan: Option<Output>,
+    /// The commands that set all this up, without `finalize_config`.
+    pub(super) commands: Vec<Command<'static>>,
+    /// The CRC-32 of those commands: a board that was set up by the same says so.
+    pub(super) crc: u32,
+}
+
+struct Builder<'a> {
+    dictionary: &'a Dictionary,
+    clock_freq: f64,
+    commands: Vec<Command<'static>>,
+    oids: u8,
+}
+
+impl Builder<'_> {
+    fn oid(&mut self) -> Oid {
+        let oid = Oid(self.oids);
+        self.oids += 1;
+        oid
+    }
+
+    fn ticks(&self, duration: Seconds) -> u32 {
+        libm::round(duration.0 * self.clock_freq) as u32
+    }
+
+    fn pin(&self, pin: &PinSpec) -> Result<u8, PrinterError> {
+        self.dictionary.pin(&pin.name).ok_or_else(|| {
+            let mcu = self.dictionary.text("MCU").unwrap_or_else(|| "the board".into());
+            PrinterError::new(ErrorCode::PinUnknown, format!("{mcu} has no pin \"{}\"", pin.name))
+        })
+    }
+
+    fn output(
+        &mut self,
+        pin: &PinSpec,
+        cycle: Option<Seconds>,
+        max_duration: Seconds,
+    ) -> Result<Output, PrinterError> {
+        let number = u32::from(self.pin(pin)?);
+        let Oid(oid) = self.oid();
+        let off = u8::from(pin.inverted);
+        let max_duration = self.ticks(max_duration);
+        self.commands.push(Command::ConfigDigitalOut { oid, pin: number, value: off, default_value: off, max_duration });
+        let cycle_ticks = cycle.map_or(0, |cycle| self.ticks(cycle));
+        if cycle_ticks > 0 {
+            self.commands.push(Command::SetDigitalOutPwmCycle { oid, cycle_ticks });
+        }
+        Ok(Output { oid: Oid(oid), inverted: pin.inverted, cycle_ticks })
+    }
+
+    fn heater(&mut self, config: &HeaterConfig) -> Result<HeaterOids, PrinterError> {
+        let pin = u32::from(self.pin(&config.sensor_pin)?);
+        let sensor = self.oid();
+        self.commands.push(Command::ConfigAnalogIn { oid: sensor.0, pin });
+        let power = self.output(&config.heater_pin, Some(config.pwm_cycle_time), HEATER_MAX_DURATION)?;
+        Ok(HeaterOids { sensor, power })
+    }
+
+    fn endstop(&mut self, pin: &PinSpec) -> Result<EndstopOids, PrinterError> {
+        let number = self.pin(pin)?;
+        let (endstop, trsync) = (self.oid(), self.oid());
+        let pull_up = match pin.pull {
+            Pull::Up => 1,
+            Pull::None | Pull::Down => 0,
+        };
+        self.commands.push(Command::ConfigEndstop { oid: endstop.0, pin: number, pull_up });
+        self.commands.push(Command::ConfigTrsync { oid: trsync.0 });
+        Ok(EndstopOids { endstop, trsync, inverted: pin.inverted })
+    }
+
+    fn stepper(&mut self, motor: &crate::config::MotorConfig) -> Result<StepperOids, PrinterError> {
+        let step_pin = self.pin(&motor.step_pin)?;
+        let dir_pin = self.pin(&motor.dir_pin)?;
+        let stepper = self.oid();
+        self.commands.push(Command::ConfigStepper {
+            oid: stepper.0,
+            step_pin,
+            dir_pin,
+            invert_step: u8::from(motor.step_pin.inverted),
+            step_pulse_ticks: self.ticks(motor.step_pulse_duration),
+        });
+        let enable = match &motor.enable_pin {
+            Some(pin) => Some(self.output(pin, None, Seconds::ZERO)?),
+            None => None,
+        };
+        Ok(StepperOids { stepper, invert_dir: motor.dir_pin.inverted, enable })
+    }
+}
+
+impl Layout {
+    /// Lays a machine out on a board.
+    pub(super) fn new(config: &PrinterConfig, dictionary: &Dictionary, clock_freq: f64) -> Result<Self, PrinterError> {
+        let wrong = |error: DictionaryError| PrinterError::new(ErrorCode::DictionaryIncomplete, error.to_string());
+        dictionary.require(NEEDED).map_err(wrong)?;
+        let mut builder = Builder { dictionary, clock_freq, commands: Vec::new(), oids: 0 };
+        let mut steppers = [None; MOTORS];
+        let [x, y, z] = &config.steppers;
+        let endstops =
+            [builder.endstop(&x.endstop_pin)?, builder.endstop(&y.endstop_pin)?, builder.endstop(&z.endstop_pin)?];
+        for (slot, axis) in steppers.iter_mut().zip(&config.steppers) {
+            *slot = Some(builder.stepper(&axis.motor)?);
+        }
+        let mut extruder = None;
+        if let Some(config) = &config.extruder {
+            steppers[3] = Some(builder.stepper(&config.motor)?);
+            extruder = Some(builder.heater(&config.heater)?);
+        }
+        let bed = config.heater_bed.as_ref().map(|bed| builder.heater(bed)).transpose()?;
+        let fan = match &config.fan {
+            Some(fan) => Some(builder.output(&fan.pin, Some(fan.cycle_time), Seconds::ZERO)?),
+            None => None,
+        };
+        let mut commands = vec![Command::AllocateOids { count: builder.oids }];
+        commands.append(&mut builder.commands);
+        let mut bytes = Vec::new();
+        for command in &commands {
+            dictionary.encode(command, &mut bytes).map_err(wrong)?;
+        }
+        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes);
+        Ok(Self { steppers, endstops, extruder, bed, fan, commands, crc })
+    }
+}

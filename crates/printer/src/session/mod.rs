@@ -1,0 +1,282 @@
+//! One connection to one board, from the first byte to the end of the last print.
+//!
+//! Sans-I/O: [`Session::receive`] takes bytes from the port, [`Session::poll`] gives bytes for it and says when it wants
+//! to be called again, and both are told the time. The owner feeds the job's file in pieces, asks for things
+//! ([`Request`]) and takes what happened ([`Event`]). Knows nothing of ports, files or screens.
+//!
+//! Nothing here restarts a print by itself: after a shutdown or a lost link the job is gone, and only the owner can
+//! start another.
+
+mod board;
+mod connect;
+mod event;
+mod homing;
+mod inbox;
+mod job;
+mod layout;
+mod ready;
+mod request;
+mod stream;
+mod thermal;
+
+use std::collections::VecDeque;
+
+use units::{Seconds, Ticks};
+use wire::Command;
+
+pub use event::{EVENTS_MAX, Event, PhaseName, Request, ScheduledMove};
+pub use job::{JobOptions, JobStatus};
+
+use self::{
+    board::Board,
+    connect::{Connecting, Identifying, Outcome, RESTART},
+    inbox::Message,
+    ready::{Failure, Ready},
+};
+use crate::{
+    config::PrinterConfig,
+    error::PrinterError,
+    link::LinkStats,
+};
+
+/// With nothing to do, the owner is asked to come back after this long.
+const IDLE_WAKE: Seconds = Seconds(1.0);
+/// The longest text that may be typed at once, in bytes.
+pub const CONSOLE_BYTES_MAX: usize = 16 * 1024;
+
+#[derive(Debug)]
+enum Stage {
+    Identifying(Box<Identifying>),
+    Connecting(Box<Connecting>),
+    Ready(Box<Ready>),
+    /// The board has stopped; it is still listened to, and a restart can be sent.
+    Shutdown(Box<Board>),
+    Failed,
+}
+
+/// A connection to a board.
+#[derive(Debug)]
+pub struct Session {
+    config: PrinterConfig,
+    stage: Stage,
+    events: VecDeque<Event>,
+    dropped: u64,
+    error: Option<PrinterError>,
+    /// Bytes that are still to be sent to a board that restarts.
+    parting: Vec<u8>,
+}
+
+impl Session {
+    /// A session on a port that has just been opened.
+    pub fn new(config: PrinterConfig, now: Seconds) -> Self {
+        let stage = Stage::Identifying(Box::new(Identifying::new(now)));
+        let events = VecDeque::from([Event::Phase(PhaseName::Identifying)]);
+        Self { config, stage, events, dropped: 0, error: None, parting: Vec::new() }
+    }
+
+    /// How far the connection is.
+    pub const fn phase(&self) -> PhaseName {
+        match self.stage {
+            Stage::Identifying(_) => PhaseName::Identifying,
+            Stage::Connecting(_) => PhaseName::Configuring,
+            Stage::Ready(_) => PhaseName::Ready,
+            Stage::Shutdown(_) => PhaseName::Shutdown,
+            Stage::Failed => PhaseName::Failed,
+        }
+    }
+
+    /// What ended the connection or stopped the board, if anything did.
+    pub const fn error(&self) -> Option<&PrinterError> {
+        self.error.as_ref()
+    }
+
+    /// What happened since this was last asked.
+    pub fn take_events(&mut self) -> VecDeque<Event> {
+        self.collect_events();
+        if self.dropped > 0 {
+            self.events.push_back(Event::Dropped(core::mem::take(&mut self.dropped)));
+        }
+        core::mem::take(&mut self.events)
+    }
+
+    fn collect_events(&mut self) {
+        if let Stage::Ready(ready) = &mut self.stage {
+            self.events.append(&mut ready.events);
+        }
+        while self.events.len() > EVENTS_MAX {
+            self.events.pop_front();
+            self.dropped += 1;
+        }
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        self.collect_events();
+        self.stage = stage;
+        self.events.push_back(Event::Phase(self.phase()));
+    }
+
+    fn fail(&mut self, error: PrinterError) {
+        self.enter(Stage::Failed);
+        self.events.push_back(Event::Error(error.clone()));
+        self.error = Some(error);
+    }
+
+    /// The board has stopped everything; what was queued for it is forgotten.
+    fn stopped(&mut self, mut board: Board, error: PrinterError) {
+        board.link.forget_all();
+        self.enter(Stage::Shutdown(Box::new(board)));
+        self.events.push_back(Event::Error(error.clone()));
+        self.error = Some(error);
+    }
+
+    fn take_stage(&mut self) -> Stage {
+        self.collect_events();
+        core::mem::replace(&mut self.stage, Stage::Failed)
+    }
+
+    /// Takes bytes from the port.
+    pub fn receive(&mut self, bytes: &[u8], now: Seconds) {
+        match &mut self.stage {
+            Stage::Identifying(identifying) => match identifying.receive(bytes, now) {
+                Ok(None) => {}
+                Ok(Some(dictionary)) => {
+                    let Stage::Identifying(identifying) = self.take_stage() else { return };
+                    match Connecting::new(identifying.into_link(), dictionary, &self.config) {
+                        Ok((connecting, identified)) => {
+                            self.enter(Stage::Connecting(Box::new(connecting)));
+                            self.events.push_back(identified);
+                        }
+                        Err(error) => self.fail(error),
+                    }
+                }
+                Err(error) => self.fail(error),
+            },
+            Stage::Connecting(connecting) => connecting.receive(bytes, now),
+            Stage::Ready(ready) => {
+                if let Err(failure) = ready.receive(bytes, now) {
+                    self.on_failure(failure);
+                }
+            }
+            Stage::Shutdown(board) => {
+                for (message, sent) in inbox::receive(&mut board.link, &board.dictionary, bytes, now) {
+                    match message {
+                        Message::Clock(low) => board.sync.clock(low, sent, now),
+                        Message::Uptime { high, low } => board.sync.uptime(high, low, sent, now),
+                        _ => {}
+                    }
+                }
+            }
+            Stage::Failed => {}
+        }
+    }
+
+    fn on_failure(&mut self, failure: Failure) {
+        let Stage::Ready(mut ready) = self.take_stage() else { return };
+        self.events.append(&mut ready.events);
+        match failure {
+            Failure::Stop(error) => {
+                let mut board = ready.board;
+                board.link.forget_all();
+                board.immediate(&Command::EmergencyStop {});
+                self.stopped(board, error);
+            }
+            Failure::Shutdown(error) => self.stopped(ready.board, error),
+            Failure::Lost(error) => self.fail(error),
+        }
+    }
+
+    /// Does what is due, appends bytes for the port to `out`, and says when to call again if nothing arrives before.
+    pub fn poll(&mut self, now: Seconds, out: &mut Vec<u8>) -> Seconds {
+        out.append(&mut self.parting);
+        match &mut self.stage {
+            Stage::Identifying(identifying) => match identifying.poll(now, out) {
+                Ok(wake) => wake,
+                Err(error) => {
+                    self.fail(error);
+                    now + IDLE_WAKE
+                }
+            },
+            Stage::Connecting(connecting) => match connecting.poll(now, out) {
+                Ok(Outcome::Pending(wake)) => wake,
+                Ok(outcome) => {
+                    self.on_connected(outcome, now);
+                    now
+                }
+                Err(error) => {
+                    self.fail(error);
+                    now + IDLE_WAKE
+                }
+            },
+            Stage::Ready(ready) => match ready.poll(now, out) {
+                Ok(wake) => wake,
+                Err(failure) => {
+                    self.on_failure(failure);
+                    now
+                }
+            },
+            Stage::Shutdown(board) => {
+                connect::ask_clock(board, now);
+                let clock_now = board.clock_at(now);
+                board.link.poll(now, clock_now, out).unwrap_or(now + IDLE_WAKE).min(now + IDLE_WAKE)
+            }
+            Stage::Failed => now + IDLE_WAKE,
+        }
+    }
+
+    fn on_connected(&mut self, outcome: Outcome, now: Seconds) {
+        let Stage::Connecting(connecting) = self.take_stage() else { return };
+        let Connecting { board, .. } = *connecting;
+        match outcome {
+            Outcome::Pending(_) => {}
+            Outcome::Ready => match Ready::new(self.config.clone(), board, now) {
+                Ok(ready) => self.enter(Stage::Ready(Box::new(ready))),
+                Err(error) => self.fail(error),
+            },
+            Outcome::NeedsRestart => {
+                self.stage = Stage::Shutdown(Box::new(board));
+                self.restart(now);
+            }
+            Outcome::Shutdown(reason) => {
+                let text = board.dictionary.enumeration_name("static_string_id", i64::from(reason));
+                let error = PrinterError::from_shutdown_text(text.unwrap_or("unknown reason"));
+                self.stopped(board, error);
+            }
+        }
+    }
+
+    /// Has the board start anew, and reads it from scratch.
+    fn restart(&mut self, now: Seconds) {
+        let board = match self.take_stage() {
+            Stage::Ready(ready) => Some(ready.board),
+            Stage::Shutdown(board) => Some(*board),
+            Stage::Connecting(connecting) => Some(connecting.board),
+            Stage::Identifying(_) | Stage::Failed => None,
+        };
+        if let Some(mut board) = board {
+            board.link.forget_all();
+            board.immediate(&Command::Reset {});
+            let clock_now = board.clock_at(now);
+            board.link.poll(now, clock_now, &mut self.parting);
+        }
+        self.error = None;
+        self.enter(Stage::Identifying(Box::new(Identifying::new(now + RESTART))));
+    }
+
+    /// Counts of the link.
+    pub fn link_stats(&self) -> Option<LinkStats> {
+        match &self.stage {
+            Stage::Connecting(connecting) => Some(connecting.board.link.stats()),
+            Stage::Ready(ready) => Some(ready.board.link.stats()),
+            Stage::Shutdown(board) => Some(board.link.stats()),
+            Stage::Identifying(_) | Stage::Failed => None,
+        }
+    }
+
+    /// The board's clock now, as far as it is known.
+    pub fn board_clock(&self, now: Seconds) -> Option<Ticks> {
+        match &self.stage {
+            Stage::Ready(ready) => Some(ready.clock_at(now)),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! The stream of motion: step commands from the planner onto the board's clock, just far enough ahead.
+//!
+//! A run of motion gets a start clock when its first move is planned; from then on every step is that clock plus the
+//! plan's own ticks, so that the same run gives the same intervals whenever it starts. Knows nothing of G-code.
+
+use std::collections::VecDeque;
+
+use steps::{StepCommand, StepCommandKind};
+use units::{Seconds, Ticks};
+use wire::Command;
+
+use super::{board::Board, event::ScheduledMove};
+use crate::{link::Lane, machine::MOTORS, planner::TimedAction};
+
+/// How much motion is planned and sent ahead of the board's clock.
+pub(super) const HORIZON: Seconds = Seconds(4.0);
+/// With less than this ahead and no more G-code at hand, the machine is brought to rest on what there is.
+pub(super) const STARVED: Seconds = Seconds(1.0);
+/// A motor's lane that has less room than this takes no more: one command of the planner's is at most three messages.
+const LANE_ROOM_MIN: usize = 3;
+/// The most things that wait for their clock.
+const TIMELINE_MAX: usize = 16_384;
+/// Motors are switched on this long before their first step.
+const ENABLE_LEAD: Seconds = Seconds(0.02);
+/// After its last step a run counts as ended only this much later: the board's clock is an estimate.
+const SETTLE: Seconds = Seconds(0.02);
+
+/// Something that happens when the board's clock gets there.
+#[derive(Clone, Debug)]
+pub(super) enum Due {
+    /// The machine gets to the end of a move.
+    MoveEnd(ScheduledMove),
+    /// A line's action.
+    Action(TimedAction),
+}
+
+/// A run of motion on the board's clock.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    pub(super) start: Ticks,
+    /// Known once its last move has been planned.
+    pub(super) end: Option<Ticks>,
+    /// Whether it belongs to homing, which is no print time.
+    pub(super) homing: bool,
+}
+
+/// What has to be said to a motor before its next steps.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pending {
+    reset: bool,
+    forward: Option<bool>,
+}
+
+/// The stream of motion.
+#[derive(Debug, Default)]
+pub(super) struct MotionStream {
+    run: Option<Run>,
+    pending: [Pending; MOTORS],
+    timeline: VecDeque<(Ticks, Due)>,
+    enabled: [bool; MOTORS],
+    /// Print time of the runs that have ended.
+    elapsed: Seconds,
+}
+
+impl MotionStream {
+    /// The run that is being made, if there is one.
+    pub(super) const fn run(&self) -> Option<Run> {
+        self.run
+    }
+
+    /// Print time of all runs so far, without those that home.
+    pub(super) fn elapsed(&self, clock_now: Ticks, board: &Board) -> Seconds {
+        let running = self.run.filter(|run| !run.homing).map_or(Seconds::ZERO, |run| {
+            let until = run.end.map_or(clock_now, |end| end.min(clock_now));
+            board.clock.duration_of(until.saturating_sub(run.start))
+        });
+        self.elapsed + running
+    }
+
+    /// Forgets the print time of what was before.
+    pub(super) fn reset_elapsed(&mut self) {
+        self.elapsed = Seconds::ZERO;
+    }
+
+    /// Whether the planner should be asked for more.
+    pub(super) fn wants_more(&self, planned_until: Seconds, clock_now: Ticks, board: &Board) -> bool {
+        let has_room = |motor| board.link.room(Lane::Motion(motor as u8)) >= LANE_ROOM_MIN;
+        self.timeline.len() < TIMELINE_MAX
+            && (0..MOTORS).all(has_room)
+            && self.run.is_none_or(|run| run.start + board.ticks(planned_until) < clock_now + board.ticks(HORIZON))
+    }
+
+    /// Whether the motion planned so far ends soon.
+    pub(super) fn is_starving(&self, planned_until: Seconds, clock_now: Ticks, board: &Board) -> bool {
+        self.run.is_some_and(|run| run.start + board.ticks(planned_until) < clock_now + board.ticks(STARVED))
+    }
+
+    /// A run starts as soon as the link allows.
+    pub(super) fn start_run(&mut self, board: &Board, now: Seconds, homing: bool) -> Run {
+        let run = Run { start: board.run_clock(now), end: None, homing };
+        self.run = Some(run);
+        self.pending = [Pending { reset: true, forward: None }; MOTORS];
+        run
+    }
+
+    /// Switches a motor's driver on before its first step at `at`.
+    fn enable(&mut self, motor: usize, at: Ticks, board: &mut Board) {
+        if self.enabled[motor] {
+            return;
+        }
+        self.enabled[motor] = true;
+        let clock = at.saturating_sub(board.ticks(ENABLE_LEAD));
+        Self::switch_driver(motor, true, clock, board);
+    }
+
+    /// Switches drivers off, at rest.
+    pub(super) fn disable(&mut self, motors: [bool; MOTORS], board: &mut Board, now: Seconds) {
+        let clock = board.output_clock(now);
+        for motor in (0..MOTORS).filter(|&motor| motors[motor]) {
+            if core::mem::take(&mut self.enabled[motor]) {
+                Self::switch_driver(motor, false, clock, board);
+            }
+        }
+    }
+
+    fn switch_driver(motor: usize, on: bool, clock: Ticks, board: &mut Board) {
+        let Some(enable) = board.layout.steppers[motor].and_then(|oids| oids.enable) else { return };
+        let on_ticks = enable.on_ticks(f64::from(u8::from(on)));
+        board.control_at(&Command::QueueDigitalOut { oid: enable.oid.0, clock: clock.low().0, on_ticks }, clock);
+    }
+
+    /// A motor's next step command, of the run that is being made.
+    pub(super) fn push(&mut self, command: &StepCommand, board: &mut Board) {
+        let Some(run) = self.run else { return };
+        let motor = command.motor;
+        let Some(oids) = board.layout.steppers[motor] else { return };
+        let oid = oids.stepper.0;
+        let (interval, count, add) = match command.kind {
+            StepCommandKind::SetDir { forward } => {
+                // It travels with the steps that it is for.
+                self.pending[motor].forward = Some(forward);
+                return;
+            }
+            StepCommandKind::QueueStep { interval, count, add } => (interval, count, add),
+        };
+        // A single step after a long rest has an interval modulo 2³²: its own clock is what counts.
+        let first = if count == 1 { command.end } else { command.start + Ticks(u64::from(interval)) };
+        let due = run.start + first;
+        self.enable(motor, due, board);
+        let Pending { reset, forward } = core::mem::take(&mut self.pending[motor]);
+        if reset {
+            board.motion(motor, &Command::ResetStepClock { oid, clock: run.start.low().0 }, due, None);
+        }
+        if let Some(forward) = forward {
+            let dir = u8::from(forward != oids.invert_dir);
+            board.motion(motor, &Command::SetNextStepDir { oid, dir }, due, None);
+        }
+        let end = run.start + command.end;
+        board.motion(motor, &Command::QueueStep { oid, interval, count, add }, due, Some(end));
+    }
+
+    /// Something happens when the board's clock gets to `at`. In the order of the clocks.
+    pub(super) fn schedule(&mut self, at: Ticks, due: Due) {
+        self.timeline.push_back((at, due));
+    }
+
+    /// The next thing whose clock has come.
+    pub(super) fn pop_due(&mut self, clock_now: Ticks) -> Option<Due> {
+        self.timeline.pop_front_if(|(at, _)| *at <= clock_now).map(|(_, due)| due)
+    }
+
+    /// The run's last move has been planned; it ends at this clock.
+    pub(super) fn end_run(&mut self, at: Ticks) {
+        if let Some(run) = &mut self.run {
+            run.end = Some(at);
+        }
+    }
+
+    /// A run that has been made to its end; it is then forgotten.
+    pub(super) fn take_finished(&mut self, clock_now: Ticks, board: &Board) -> Option<Run> {
+        let run = self.run?;
+        let end = run.end?;
+        if clock_now <= end + board.ticks(SETTLE) || !self.timeline.is_empty() {
+            return None;
+        }
+        if !run.homing {
+            self.elapsed += board.clock.duration_of(end - run.start);
+        }
+        self.run = None;
+        Some(run)
+    }
+
+    /// Drops what has not been sent: the motors were stopped by something else.
+    pub(super) fn abandon(&mut self, board: &mut Board) {
+        for motor in 0..MOTORS {
+            board.link.forget_motion(motor as u8);
+        }
+        self.timeline.clear();
+        self.run = None;
+    }
+
+    /// How much motion the board has, in seconds from its clock: up to the first step that it has not acknowledged,
+    /// or to the end of what is planned. `None` where no run is being made.
+    pub(super) fn queued_on_board(&self, planned_until: Seconds, clock_now: Ticks, board: &Board) -> Option<Seconds> {
+        let run = self.run?;
+        let planned = run.end.unwrap_or(run.start + board.ticks(planned_until));
+        let until = board.link.motion_covered().map_or(planned, |covered| covered.min(planned));
+        Some(board.clock.duration_of(until.saturating_sub(clock_now)))
+    }
+}
