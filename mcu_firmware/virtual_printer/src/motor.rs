@@ -21,6 +21,11 @@ pub const TIME_STEP_US: u32 = 100;
 const PERIODS_PER_SUBSTEP_MAX: f64 = 1.0 / 16.0;
 /// At most so many parts; a field that fast drags no rotor anyway.
 const SUBSTEPS_MAX: f64 = 32.0;
+/// A rotor that lags by more than this may be about to slip: where it comes to rest then is a close decision, and time
+/// is cut finer.
+const LAG_PERIODS_FINE: f64 = 0.08;
+/// By this much.
+const FINER: u64 = 16;
 /// How fast the current, and with it the torque, follows the speed of the field: the coils' L/R.
 const CURRENT_TIME_CONSTANT_S: f64 = 0.001;
 /// Least dry friction: without any, a rotor would swing for ever.
@@ -105,6 +110,8 @@ struct Model {
     drag_per_s: f64,
     damping_per_s: f64,
     damping_max: f64,
+    /// The speed against the field with which a swing of [`LAG_PERIODS_FINE`] goes through the middle.
+    swing_rate_fine: f64,
 }
 
 impl Model {
@@ -126,6 +133,7 @@ impl Model {
             damping_per_s: 2.0 * mechanics.damping_ratio * natural_rad_s,
             // Eddy currents damp swings; they do not drag a stalled rotor along.
             damping_max: 0.05 * pull,
+            swing_rate_fine: LAG_PERIODS_FINE * period * natural_rad_s,
         }
     }
 }
@@ -141,19 +149,39 @@ pub(crate) struct MotorState {
     /// Σ ±(ticks left in the chunk) over the pulses of the chunk; gives the field's mean.
     weight: i64,
     chunk_end: u64,
-    chunk_ticks: u64,
-    chunk_s: f64,
+    /// The chunk under way: one of the two below.
+    chunk: Chunk,
+    coarse: Chunk,
+    fine: Chunk,
     tick_s: f64,
     rotor: f64,
     velocity: f64,
     /// Speed of the field as the current sees it, in microsteps/s.
     rate: f64,
-    rate_gain: f64,
     energised: bool,
     settled: bool,
     stops: Stops,
     /// The limit switches on this motor's axis.
     pub(crate) switches: Vec<Switch>,
+}
+
+/// A length of time.
+#[derive(Clone, Copy, Debug)]
+struct Chunk {
+    ticks: u64,
+    seconds: f64,
+    per_tick: f64,
+    per_second: f64,
+    /// How far the current follows the field within it.
+    gain: f64,
+}
+
+impl Chunk {
+    fn new(ticks: u64, tick_s: f64) -> Self {
+        let seconds = ticks as f64 * tick_s;
+        let gain = 1.0 - libm::exp(-seconds / CURRENT_TIME_CONSTANT_S);
+        Self { ticks, seconds, per_tick: 1.0 / ticks as f64, per_second: 1.0 / seconds, gain }
+    }
 }
 
 /// Where the frame ends, in microsteps from where the rotor stood at power-up.
@@ -167,12 +195,18 @@ impl Stops {
     pub(crate) const NONE: Self = Self { min: f64::NEG_INFINITY, max: f64::INFINITY };
 }
 
+/// The part of a turn beyond the nearest whole one, −0.5 to 0.5.
+#[inline]
+fn wrapped(turns: f64) -> f64 {
+    // Adding and taking away 1.5·2⁵² rounds to the nearest whole number (IEEE 754, to nearest).
+    const ROUND: f64 = 6_755_399_441_055_744.0;
+    turns - ((turns + ROUND) - ROUND)
+}
+
 /// sin(2π·turns) for any angle, to 1e-7: the platform's sine is neither the same everywhere nor cheap.
 #[inline]
 fn sin_turns(turns: f64) -> f64 {
-    // Adding and taking away 1.5·2⁵² rounds to the nearest whole number (IEEE 754, to nearest).
-    const ROUND: f64 = 6_755_399_441_055_744.0;
-    let y = turns - ((turns + ROUND) - ROUND);
+    let y = wrapped(turns);
     // Folded to a quarter turn, then the Taylor series around zero.
     let a = 0.25 - (y.abs() - 0.25).abs();
     let x = a * TURN_RAD;
@@ -193,20 +227,20 @@ impl MotorState {
     ) -> Self {
         let chunk_ticks = (u64::from(clock_hz) * u64::from(time_step_us) / 1_000_000).max(1);
         let tick_s = 1.0 / f64::from(clock_hz);
-        let chunk_s = chunk_ticks as f64 * tick_s;
+        let coarse = Chunk::new(chunk_ticks, tick_s);
         Self {
             model: Model::new(mechanics),
             field: 0,
             chunk_field: 0,
             weight: 0,
             chunk_end: start + chunk_ticks,
-            chunk_ticks,
-            chunk_s,
+            chunk: coarse,
+            coarse,
+            fine: Chunk::new((chunk_ticks / FINER).max(1), tick_s),
             tick_s,
             rotor: 0.0,
             velocity: 0.0,
             rate: 0.0,
-            rate_gain: 1.0 - libm::exp(-chunk_s / CURRENT_TIME_CONSTANT_S),
             energised: false,
             settled: true,
             stops,
@@ -245,34 +279,32 @@ impl MotorState {
     pub(crate) fn advance(&mut self, now: u64) {
         while now >= self.chunk_end {
             if self.settled {
-                let chunks = (now - self.chunk_end) / self.chunk_ticks + 1;
-                self.chunk_end += chunks * self.chunk_ticks;
+                let chunks = (now - self.chunk_end) / self.chunk.ticks + 1;
+                self.chunk_end += chunks * self.chunk.ticks;
                 return;
             }
-            self.chunk();
-            self.chunk_end += self.chunk_ticks;
+            self.integrate_chunk();
         }
     }
 
-    fn chunk(&mut self) {
+    /// Integrates the chunk under way and begins the next.
+    fn integrate_chunk(&mut self) {
+        let chunk = self.chunk;
         let turned = (self.field - self.chunk_field) as f64;
-        let mean = self.chunk_field as f64 + self.weight as f64 / self.chunk_ticks as f64;
+        let mean = self.chunk_field as f64 + self.weight as f64 * chunk.per_tick;
         let still = self.velocity == 0.0 && self.weight == 0 && turned == 0.0;
-        self.rate += self.rate_gain * (turned / self.chunk_s - self.rate);
+        let rate_before = self.rate;
+        let rate_after = rate_before + chunk.gain * (turned * chunk.per_second - rate_before);
+        // Its value in the middle of the chunk, for second order.
+        self.rate = 0.5 * (rate_before + rate_after);
         let before = self.rotor;
         let periods = turned.abs() * self.model.per_period;
         if periods <= PERIODS_PER_SUBSTEP_MAX {
-            self.integrate(mean, self.chunk_s);
+            self.integrate(mean, chunk.seconds);
         } else {
-            // The field moves along a straight line with the same mean.
-            let parts = (periods / PERIODS_PER_SUBSTEP_MAX).min(SUBSTEPS_MAX);
-            let count = parts as u32 + 1;
-            let each = 1.0 / f64::from(count);
-            for part in 0..count {
-                let place = (f64::from(part) + 0.5) * each - 0.5;
-                self.integrate(mean + turned * place, self.chunk_s * each);
-            }
+            self.integrate_in_parts(mean, turned, periods);
         }
+        self.rate = rate_after;
         self.chunk_field = self.field;
         self.weight = 0;
         // Friction holds a rotor that has stopped: with the same forces it stays where it is.
@@ -280,11 +312,29 @@ impl MotorState {
             self.settled = true;
             self.rate = 0.0;
         }
-        if !self.switches.is_empty() {
-            let began = self.chunk_end - self.chunk_ticks;
-            for switch in &mut self.switches {
-                switch.moved(before, self.rotor, began, self.chunk_ticks);
-            }
+        for switch in &mut self.switches {
+            switch.moved(before, self.rotor, self.chunk_end - chunk.ticks, chunk.ticks);
+        }
+        self.chunk =
+            if self.energised && !self.settled && self.is_out_of_step() { self.fine } else { self.coarse };
+        self.chunk_end += self.chunk.ticks;
+    }
+
+    /// Whether the swing around the field is so wide that the rotor slips or may be about to.
+    #[inline]
+    fn is_out_of_step(&self) -> bool {
+        let lag = wrapped((self.field as f64 - self.rotor) * self.model.per_period);
+        lag.abs() > LAG_PERIODS_FINE || (self.rate - self.velocity).abs() > self.model.swing_rate_fine
+    }
+
+    /// The field moves along a straight line with the mean that it has.
+    #[cold]
+    fn integrate_in_parts(&mut self, mean: f64, turned: f64, periods: f64) {
+        let count = (periods / PERIODS_PER_SUBSTEP_MAX).min(SUBSTEPS_MAX) as u32 + 1;
+        let each = 1.0 / f64::from(count);
+        for part in 0..count {
+            let place = (f64::from(part) + 0.5) * each - 0.5;
+            self.integrate(mean + turned * place, self.chunk.seconds * each);
         }
     }
 
@@ -293,14 +343,19 @@ impl MotorState {
     fn integrate(&mut self, field: f64, dt: f64) {
         let model = &self.model;
         let middle = self.rotor + self.velocity * (0.5 * dt);
-        let mut acceleration = -model.load - model.drag_per_s * self.velocity;
+        let mut acceleration = -model.load;
         if self.energised {
             let speed = self.rate.abs();
             let pull =
                 if speed > model.corner_rate { model.pull * (model.corner_rate / speed) } else { model.pull };
-            let damping = model.damping_per_s * (self.rate - self.velocity);
-            acceleration += pull * sin_turns((field - middle) * model.per_period)
-                + damping.max(-model.damping_max).min(model.damping_max);
+            acceleration += pull * sin_turns((field - middle) * model.per_period);
+        }
+        // What depends on the speed takes its value in the middle of the step.
+        let speed = self.velocity + acceleration * (0.5 * dt);
+        acceleration -= model.drag_per_s * speed;
+        if self.energised {
+            let damping = model.damping_per_s * (self.rate - speed);
+            acceleration += damping.max(-model.damping_max).min(model.damping_max);
         }
         let velocity = self.velocity + acceleration * dt;
         // Dry friction takes speed away and never reverses it.
@@ -318,12 +373,13 @@ impl MotorState {
     /// The level of one of the motor's switches now: true while the contact is closed.
     pub(crate) fn switch_closed(&mut self, index: usize, now: u64) -> bool {
         self.advance(now);
-        let since = now + self.chunk_ticks - self.chunk_end;
+        let began = self.chunk_end - self.chunk.ticks;
+        let since = now - began;
         let ahead = if self.settled { 0.0 } else { self.velocity * since as f64 * self.tick_s };
         let rotor = self.rotor;
         match self.switches.get_mut(index) {
             Some(switch) => {
-                switch.moved(rotor, rotor + ahead, self.chunk_end - self.chunk_ticks, since);
+                switch.moved(rotor, rotor + ahead, began, since);
                 switch.closed(now)
             }
             None => false,

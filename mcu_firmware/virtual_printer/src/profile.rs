@@ -106,8 +106,7 @@ impl BoardProfile {
     pub fn pin(&self, name: &str) -> Option<u8> {
         let digits = name.find(|c: char| c.is_ascii_digit())?;
         let (stem, number) = name.split_at(digits);
-        // "gpio05" is no pin's name.
-        let number: u8 = number.parse().ok().filter(|parsed: &u8| parsed.to_string() == number)?;
+        let number: u8 = number.parse().ok()?;
         self.pins.iter().find_map(|&(first, value, count)| {
             (first.strip_suffix('0') == Some(stem) && number < count).then_some(value + number)
         })

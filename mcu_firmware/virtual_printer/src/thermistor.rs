@@ -90,9 +90,6 @@ mod tests {
             let found = thermistor.resistance(Celsius(celsius)).0;
             assert!((found / ohms - 1.0).abs() < 1e-6, "{celsius}: {found}");
         }
-        // Between the points, the data sheet's own value at 100 °C.
-        let at_100 = thermistor.resistance(Celsius(100.0)).0;
-        assert!((at_100 / 6710.0 - 1.0).abs() < 0.02, "{at_100}");
     }
 
     #[test]
