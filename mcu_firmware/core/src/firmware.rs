@@ -87,6 +87,8 @@ pub(crate) struct Core<const OBJECTS: usize, const MOVES: usize> {
     pub(crate) config_crc: Option<u32>,
     pub(crate) uptime: Uptime,
     stats: Stats,
+    /// When the clock has to be looked at again.
+    look_at: Clock32,
     late_ticks: u32,
     starting: bool,
     pub(crate) reports_pending: bool,
@@ -103,6 +105,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             config_crc: None,
             uptime: Uptime::new(),
             stats: Stats::new(clock),
+            look_at: Clock32(0),
             late_ticks: clock.0 / LATE_SECONDS_INVERSE,
             starting: true,
             reports_pending: false,
@@ -141,30 +144,48 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         }
     }
 
+    /// Runs for every edge of every step: what is rare is kept out of line.
     fn run_timers(&mut self, board: &mut impl Board) -> Clock32 {
         let mut now = board.now();
-        self.uptime.look(now);
-        let stats_at = self.stats.look(now);
+        if !now.is_before(self.look_at) || self.stats.is_new() {
+            self.look(now);
+        }
         while let Some((oid, wake)) = self.timers.first() {
             if now.is_before(wake) {
                 now = board.now();
                 if now.is_before(wake) {
-                    return if stats_at.is_before(wake) { stats_at } else { wake };
+                    return if self.look_at.is_before(wake) { self.look_at } else { wake };
                 }
             }
-            if now.since(wake).unsigned_abs() > self.late_ticks {
+            if now.since(wake) as u32 > self.late_ticks {
                 self.shut_down(board, ShutdownReason::TimerInPast);
                 break;
             }
-            self.run_timer(board, oid, wake);
+            if let Some(Object::Stepper(stepper)) = self.objects.get_mut(oid) {
+                match stepper.event(board, &mut self.moves, self.late_ticks) {
+                    Ok(Some(next)) => self.timers.reschedule_first(next),
+                    Ok(None) => self.timers.cancel(oid),
+                    Err(reason) => self.shut_down(board, reason),
+                }
+            } else {
+                self.run_timer(board, oid, wake);
+            }
         }
-        stats_at
+        self.look_at
     }
 
-    #[inline]
+    /// Looks at the clock, which is due every few seconds.
+    #[cold]
+    #[inline(never)]
+    fn look(&mut self, now: Clock32) {
+        self.uptime.look(now);
+        self.look_at = self.stats.look(now);
+    }
+
+    /// The timers of everything but steppers.
+    #[inline(never)]
     fn run_timer(&mut self, board: &mut impl Board, oid: u8, wake: Clock32) {
         let after = match self.objects.get_mut(oid) {
-            Some(Object::Stepper(stepper)) => stepper.event(board, &mut self.moves, self.late_ticks),
             Some(Object::DigitalOut(output)) => output.event(board, &mut self.moves, wake),
             Some(Object::Endstop(endstop)) => Ok(endstop.event(board, wake)),
             Some(Object::AnalogIn(input)) => {
@@ -178,7 +199,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
                 let next = trsync.wake().map_or(After::Done, After::Again);
                 Ok(if let Due::Expired(reason) = due { After::Fire { trsync: oid, reason } } else { next })
             }
-            Some(Object::Free) | None => Ok(After::Done),
+            Some(Object::Stepper(_) | Object::Free) | None => Ok(After::Done),
         };
         match after {
             Ok(After::Again(next)) => self.timers.reschedule_first(next),

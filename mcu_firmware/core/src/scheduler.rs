@@ -49,13 +49,13 @@ impl<const N: usize> Timers<N> {
     pub(crate) fn reschedule_first(&mut self, wake: Clock32) {
         let id = self.head;
         let Some(node) = self.nodes.get_mut(usize::from(id)) else { return };
+        node.wake = wake;
         let second = node.next;
-        match self.nodes.get(usize::from(second)) {
-            Some(next) if !wake.is_before(next.wake) => {
-                self.head = second;
-                self.insert_after(second, id, wake);
-            }
-            _ => self.nodes[usize::from(id)].wake = wake,
+        if let Some(next) = self.nodes.get(usize::from(second))
+            && !wake.is_before(next.wake)
+        {
+            self.head = second;
+            self.insert_after(second, id, wake);
         }
     }
 

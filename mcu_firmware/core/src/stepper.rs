@@ -25,11 +25,11 @@ pub(crate) struct Stepper {
     forward: bool,
     /// The direction of moves that are yet to come from the host.
     next_forward: bool,
-    /// The planned clock of the next step, or of the last one when none is left.
+    /// The planned clock of the next step; of the last one during its pulse and when none is left.
     step_clock: Clock32,
     interval: u32,
     add: i16,
-    /// Steps left in the current row.
+    /// Steps of the current row that have not begun. Between pulses the timer only runs while there are some.
     left: u16,
     queue: Queue,
     position: i32,
@@ -67,39 +67,39 @@ impl Stepper {
         })
     }
 
-    /// The next edge. Steps that are due before the pin may rise again are put off, not lost.
+    /// The next edge, and when the one after it is due. Steps that are due before the pin may rise again are put off,
+    /// not lost.
     #[inline]
     pub(crate) fn event<const M: usize>(
         &mut self,
         board: &mut impl Board,
         moves: &mut MovePool<M>,
         late_ticks: u32,
-    ) -> Result<After, ShutdownReason> {
-        if self.in_pulse {
-            board.set_pin(self.step_pin, self.inverted);
-            self.in_pulse = false;
-            if self.left == 0 && !self.load(board, moves) {
-                return Ok(After::Done);
-            }
-            let earliest = board.now().wrapping_add(self.pulse_ticks);
-            let ahead = self.step_clock.since(earliest);
-            if ahead >= 0 {
-                return Ok(After::Again(self.step_clock));
-            }
-            if ahead.unsigned_abs() > late_ticks {
-                return Err(ShutdownReason::StepperTooFarInPast);
-            }
-            return Ok(After::Again(earliest));
+    ) -> Result<Option<Clock32>, ShutdownReason> {
+        if !self.in_pulse {
+            board.set_pin(self.step_pin, !self.inverted);
+            self.in_pulse = true;
+            self.position = self.position.wrapping_add(i32::from(self.forward) * 2 - 1);
+            self.left = self.left.wrapping_sub(1);
+            return Ok(Some(board.now().wrapping_add(self.pulse_ticks)));
         }
-        board.set_pin(self.step_pin, !self.inverted);
-        self.in_pulse = true;
-        self.position = self.position.wrapping_add(if self.forward { 1 } else { -1 });
-        self.left = self.left.saturating_sub(1);
+        board.set_pin(self.step_pin, self.inverted);
+        self.in_pulse = false;
         if self.left != 0 {
             self.interval = self.interval.wrapping_add_signed(i32::from(self.add));
             self.step_clock = self.step_clock.wrapping_add(self.interval);
+        } else if !self.load(board, moves) {
+            return Ok(None);
         }
-        Ok(After::Again(board.now().wrapping_add(self.pulse_ticks)))
+        let earliest = board.now().wrapping_add(self.pulse_ticks);
+        let ahead = self.step_clock.since(earliest);
+        if ahead >= 0 {
+            Ok(Some(self.step_clock))
+        } else if ahead.unsigned_abs() > late_ticks {
+            Err(ShutdownReason::StepperTooFarInPast)
+        } else {
+            Ok(Some(earliest))
+        }
     }
 
     /// Takes the next row off the queue; `false` when there is none.

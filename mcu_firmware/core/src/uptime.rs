@@ -50,8 +50,12 @@ impl Stats {
         Self { period, due_at: None, pending: false, count: 0, sum: 0, sumsq: 0 }
     }
 
+    /// Whether it was never shown the clock.
+    pub(crate) const fn is_new(&self) -> bool {
+        self.due_at.is_none()
+    }
+
     /// Sees whether a report is due; the clock of the next one.
-    #[inline]
     pub(crate) fn look(&mut self, now: Clock32) -> Clock32 {
         let due_at = self.due_at.unwrap_or_else(|| now.wrapping_add(self.period));
         if now.is_before(due_at) {
