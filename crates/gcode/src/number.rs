@@ -58,7 +58,7 @@ fn read_short(bytes: &[u8], at: usize) -> Option<(f64, usize)> {
     let below = (1 << whole) - 1;
     let (packed, bits, length, divisor) = if (word >> whole) & 0xff == u64::from(b'.') {
         let behind = (others & (others - 1)).trailing_zeros() & !7;
-        if behind == 64 {
+        if behind == 64 && digit_at(bytes, at + 8).is_some() {
             return None;
         }
         let decimals = (behind - whole) / 8 - 1;

@@ -1,6 +1,7 @@
 //! What lines mean, by area.
 
 mod commands;
+mod dialects;
 mod moves;
 mod robustness;
 
