@@ -7,7 +7,7 @@
 //! Whether a command is closed depends on the step times alone, never on when they become known: a later step either
 //! closes it by its distance or could have gone on with it.
 
-use crate::stabbing::{FIT_STEPS_MAX, Stabbing};
+use crate::stabbing::{FIT_STEPS_MAX, Stabbing, larger, smaller};
 use crate::{IDLE_TICKS_MAX, StepCommand, StepCommandKind};
 use std::collections::VecDeque;
 use units::{Seconds, Ticks};
@@ -36,12 +36,14 @@ pub(crate) struct Compressor {
     span_max: f64,
     /// Exact clock of the last step given out.
     base: u64,
+    /// The same number.
+    base_ticks: f64,
     /// True time of that step.
     base_time: f64,
     /// True times of the steps since, one way; the last one's window is not known yet.
     times: Vec<f64>,
-    /// How many of them the stabbing has taken.
-    taken: usize,
+    /// How far the last step is from the one before it.
+    gap_before: f64,
     forward: bool,
     /// Direction that the motor has been told in this run.
     told: Option<bool>,
@@ -77,9 +79,10 @@ impl Compressor {
             hold_max: STEP_HOLD_MAX.0 * ticks_per_s,
             span_max: RUN_SPAN_MAX.0 * ticks_per_s,
             base: 0,
+            base_ticks: 0.0,
             base_time: f64::NEG_INFINITY,
             times: Vec::new(),
-            taken: 0,
+            gap_before: 0.0,
             forward: true,
             told: None,
             stabbing: Stabbing::new(),
@@ -97,9 +100,9 @@ impl Compressor {
     /// Forgets everything but the tally; clocks start at 0.
     pub(crate) fn begin_run(&mut self) {
         self.base = 0;
+        self.base_ticks = 0.0;
         self.base_time = f64::NEG_INFINITY;
         self.times.clear();
-        self.taken = 0;
         self.told = None;
         self.stabbing.clear();
         self.out.clear();
@@ -121,31 +124,52 @@ impl Compressor {
     }
 
     /// A step at `time` (ticks). Times never fall.
+    #[inline]
     pub(crate) fn step(&mut self, time: f64, forward: bool) {
-        let Some(&last) = self.times.last() else {
-            // After a rest, or at the very start of a run: the board needs an interval of some length.
-            let earliest = (self.base as f64).max(self.base_time) + self.gap_min;
-            self.forward = forward;
-            self.times.push(time.max(earliest));
-            return;
-        };
+        let Some(&last) = self.times.last() else { return self.first_step(time, forward) };
         let gap = time - last;
-        if forward == self.forward {
-            let gap = gap.max(self.gap_min);
-            self.tally.gap_min = self.tally.gap_min.min(gap);
-            let time = last + gap;
-            self.take_last(time);
-            if gap > self.hold_max || self.times.first().is_some_and(|first| time - first > self.span_max) {
-                self.emit_all(time);
-            }
-            self.times.push(time);
-        } else if gap < self.gap_min {
-            self.times.pop();
-        } else {
-            self.emit_all(time);
-            self.forward = forward;
-            self.times.push(time);
+        if forward != self.forward {
+            return self.step_back(time, gap);
         }
+        let gap = larger(gap, self.gap_min);
+        self.tally.gap_min = smaller(self.tally.gap_min, gap);
+        let time = last + gap;
+        // The usual case of `take_last`.
+        let error = self.error(self.gap_before, gap);
+        let ticks = last - self.base_ticks;
+        if self.stabbing.count() == 0 || !self.stabbing.take(ticks - error, ticks + error) {
+            self.take_last(time);
+        }
+        self.gap_before = gap;
+        // None is left where the last one came after a long rest.
+        let first = self.times.first().copied().unwrap_or(time);
+        if gap > self.hold_max || time - first > self.span_max {
+            self.emit_all(time);
+        }
+        self.times.push(time);
+    }
+
+    /// A step after which nothing was known: after a rest, or at the very start of a run.
+    fn first_step(&mut self, time: f64, forward: bool) {
+        // The board needs an interval of some length.
+        let time = larger(time, larger(self.base_ticks, self.base_time) + self.gap_min);
+        self.forward = forward;
+        self.gap_before = time - self.base_time;
+        self.times.push(time);
+    }
+
+    /// A step against the direction of the last one, `gap` later.
+    fn step_back(&mut self, time: f64, gap: f64) {
+        if gap < self.gap_min {
+            self.times.pop();
+            let before = self.times.len().checked_sub(2).map_or(self.base_time, |i| self.times[i]);
+            self.gap_before = self.times.last().map_or(0.0, |last| last - before);
+            return;
+        }
+        self.emit_all(time);
+        self.forward = !self.forward;
+        self.gap_before = gap;
+        self.times.push(time);
     }
 
     /// Nothing comes before `time`: gives out what could not go on beyond it.
@@ -160,15 +184,15 @@ impl Compressor {
         self.emit_all(f64::INFINITY);
     }
 
-    /// Fits the last step in, now that its neighbour at `next` is known.
+    /// Fits the last step in, now that its neighbour at `next` is known, and any that a closed command left.
+    #[inline(never)]
     fn take_last(&mut self, next: f64) {
-        while self.taken < self.times.len() {
-            let (earliest, latest) = self.window(self.taken, next);
-            if self.taken == 0 && latest > IDLE_TICKS_MAX as f64 {
+        while (self.stabbing.count() as usize) < self.times.len() {
+            let index = self.stabbing.count() as usize;
+            let (earliest, latest) = self.window(index, next);
+            if index == 0 && latest > IDLE_TICKS_MAX as f64 {
                 self.emit_after_rest();
-            } else if self.stabbing.take(earliest, latest) {
-                self.taken += 1;
-            } else {
+            } else if !self.stabbing.take(earliest, latest) {
                 self.emit();
             }
         }
@@ -179,9 +203,15 @@ impl Compressor {
         let time = self.times[index];
         let before = if index == 0 { self.base_time } else { self.times[index - 1] };
         let after = self.times.get(index + 1).copied().unwrap_or(next);
-        let error = self.max_error.min(GAP_SHARE * (time - before)).min(GAP_SHARE * (after - time));
-        let ticks = time - self.base as f64;
-        ((ticks - error).max(1.0), ticks + error)
+        let error = self.error(time - before, after - time);
+        let ticks = time - self.base_ticks;
+        (larger(ticks - error, 1.0), ticks + error)
+    }
+
+    /// How early or late a step may come between two gaps.
+    #[inline]
+    fn error(&self, gap_before: f64, gap_after: f64) -> f64 {
+        smaller(self.max_error, GAP_SHARE * smaller(gap_before, gap_after))
     }
 
     /// Gives out all steps; whatever follows them comes at `next`.
@@ -198,17 +228,19 @@ impl Compressor {
     /// Closes one command with the steps taken so far, or with the first of them.
     fn emit(&mut self) {
         let fit = self.stabbing.fit();
-        let mut clock = self.base;
-        let mut interval = i64::from(fit.interval);
-        let mut error = 0.0_f64;
+        // Floats hold these integers exactly, and need no conversion to be compared.
+        let mut clock = self.base_ticks;
+        let mut interval = f64::from(fit.interval);
+        let add = f64::from(fit.add);
+        let mut error = 0.0;
         for &time in &self.times[..fit.count as usize] {
-            clock = clock.wrapping_add_signed(interval);
-            interval += i64::from(fit.add);
-            error = error.max((clock as f64 - time).abs());
+            clock += interval;
+            interval += add;
+            error = larger(error, (clock - time).abs());
         }
         let kind =
             StepCommandKind::QueueStep { interval: fit.interval, count: fit.count as u16, add: fit.add };
-        self.put(kind, clock, fit.count as usize, error);
+        self.put(kind, clock as u64, fit.count as usize, error);
     }
 
     /// A single step after a rest that the board's 32-bit clock cannot express: the distance wraps.
@@ -237,9 +269,9 @@ impl Compressor {
         self.tally.queue_steps += 1;
         self.tally.error_max = self.tally.error_max.max(error);
         self.base = end;
+        self.base_ticks = end as f64;
         self.base_time = self.times[steps - 1];
         self.times.drain(..steps);
-        self.taken = 0;
         self.stabbing.clear();
     }
 }

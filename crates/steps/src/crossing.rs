@@ -1,6 +1,7 @@
 //! When a motor crosses from one grid position to the next: closed form, one square root a step.
 
 use crate::MotorSegment;
+use crate::stabbing::{larger, smaller};
 
 /// A stretch in which a motor moves one way, with the steps that fall into it.
 #[derive(Clone, Copy, Debug)]
@@ -112,11 +113,11 @@ impl Piece {
     /// Run clock of the next crossing, in ticks; moves on to the one after.
     pub(crate) fn next_time(&mut self) -> f64 {
         // The root of velocity·τ + half_accel·τ² = way that stays exact where either vanishes.
-        let root = (self.velocity2 + self.accel_twice * self.way).max(0.0).sqrt();
-        let time = 2.0 * self.way / (self.velocity + root).max(f64::MIN_POSITIVE);
+        let root = larger(self.velocity2 + self.accel_twice * self.way, 0.0).sqrt();
+        let time = 2.0 * self.way / larger(self.velocity + root, f64::MIN_POSITIVE);
         self.way += 1.0;
         self.steps -= 1;
         // Rounding must not carry a step beyond the piece that it was counted in.
-        self.start + time.min(self.duration)
+        self.start + smaller(time, self.duration)
     }
 }

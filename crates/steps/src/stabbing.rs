@@ -51,7 +51,8 @@ impl Line {
 /// One value of `add` with the intervals that pass every window with it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Candidate {
-    add: i64,
+    /// An integer.
+    add: f64,
     low: f64,
     high: f64,
 }
@@ -95,20 +96,21 @@ impl Stabbing {
         self.slits.clear();
     }
 
+    /// Windows taken since the last [`Self::clear`].
+    #[inline]
+    pub(crate) const fn count(&self) -> u32 {
+        self.count
+    }
+
     /// Takes the window of the next step, in ticks after the step before the command; `false`, and nothing changes, where
     /// no line passes it too. The first window is always taken: it must be at least one tick wide and reach above 1.
+    #[inline]
     pub(crate) fn take(&mut self, earliest: f64, latest: f64) -> bool {
         let x = f64::from(self.count);
         let inverse = 1.0 / (x + 1.0);
         let (low, high) = (earliest * inverse, latest * inverse);
-        let taken = if self.count == 0 {
-            self.start(low, high);
-            true
-        } else if self.followed > 0 {
-            self.count < FIT_STEPS_MAX && self.follow(x, low, high)
-        } else {
-            self.count < FIT_STEPS_MAX && self.narrow(x, low, high)
-        };
+        let taken = self.count < FIT_STEPS_MAX
+            && if self.followed > 0 { self.follow(x, low, high) } else { self.narrow(x, low, high) };
         self.count += u32::from(taken);
         taken
     }
@@ -122,7 +124,12 @@ impl Stabbing {
     }
 
     /// The next slit, while lines are followed.
+    #[inline(never)]
     fn narrow(&mut self, x: f64, low: f64, high: f64) -> bool {
+        if self.count == 0 {
+            self.start(low, high);
+            return true;
+        }
         let (top, bottom) = (self.steepest.at(x), self.flattest.at(x));
         // Too low for the steepest line's end, or too high for the flattest one's: nothing passes.
         if low > top || high < bottom || !self.has_add() {
@@ -166,34 +173,38 @@ impl Stabbing {
 
     /// The intervals that pass all windows with this `add`, which must lie between the two extreme lines.
     fn candidate(&self, add: i64) -> Candidate {
-        let slope = 0.5 * add as f64;
-        let low = self.lows.points().fold(f64::NEG_INFINITY, |low, (x, y)| low.max(y - slope * x));
-        let high = self.highs.points().fold(f64::INFINITY, |high, (x, y)| high.min(y - slope * x));
+        let add = add as f64;
+        let slope = 0.5 * add;
+        let low = self.lows.points().fold(f64::NEG_INFINITY, |low, (x, y)| larger(low, y - slope * x));
+        let high = self.highs.points().fold(f64::INFINITY, |high, (x, y)| smaller(high, y - slope * x));
         Candidate { add, low, high }
     }
 
     /// The next slit, while candidates are followed.
+    #[inline]
     fn follow(&mut self, x: f64, low: f64, high: f64) -> bool {
-        let mut alive = [Candidate::default(); CANDIDATES_MAX];
-        let mut count = 0;
         let half_x = 0.5 * x;
-        for candidate in &self.candidates[..self.followed] {
-            let rise = candidate.add as f64 * half_x;
-            let next = Candidate {
-                add: candidate.add,
-                low: candidate.low.max(low - rise),
-                high: candidate.high.min(high - rise),
-            };
-            if has_integer(next.low, next.high) {
-                alive[count] = next;
-                count += 1;
+        let before = self.followed;
+        let mut index = 0;
+        while index < self.followed {
+            let candidate = &mut self.candidates[index];
+            let rise = candidate.add * half_x;
+            let next_low = larger(candidate.low, low - rise);
+            let next_high = smaller(candidate.high, high - rise);
+            if has_integer(next_low, next_high) {
+                candidate.low = next_low;
+                candidate.high = next_high;
+                index += 1;
+            } else {
+                // It keeps its range, for the case that none of them passes this slit.
+                self.followed -= 1;
+                self.candidates.swap(index, self.followed);
             }
         }
-        if count == 0 {
+        if self.followed == 0 {
+            self.followed = before;
             return false;
         }
-        self.candidates = alive;
-        self.followed = count;
         true
     }
 
@@ -202,13 +213,13 @@ impl Stabbing {
     /// At least one window must have been taken.
     pub(crate) fn fit(&self) -> Fit {
         if self.followed > 0 {
-            let cost = |c: &&Candidate| (!ADD_SHORT.contains(&c.add), c.add.abs());
+            let cost = |c: &&Candidate| (!ADD_SHORT.contains(&(c.add as i64)), c.add.abs() as i64);
             let best = self.candidates[..self.followed].iter().min_by_key(cost);
             return Fit::new(best.copied().unwrap_or_default(), self.count);
         }
         if self.count == 1 {
             let (low, high) = self.slits[0];
-            return Fit::new(Candidate { add: 0, low, high }, 1);
+            return Fit::new(Candidate { add: 0.0, low, high }, 1);
         }
         let first = ceil(2.0 * self.flattest.slope);
         let last = floor(2.0 * self.steepest.slope);
@@ -230,12 +241,13 @@ impl Stabbing {
 
     /// The candidate that passes the most windows from the first on.
     fn longest(&self, adds: impl Iterator<Item = i64>) -> Fit {
-        let mut best = (Candidate { add: 0, low: self.slits[0].0, high: self.slits[0].1 }, 1);
+        let mut best = (Candidate { add: 0.0, low: self.slits[0].0, high: self.slits[0].1 }, 1);
         for add in adds {
+            let add = add as f64;
             let mut reached = Candidate { add, low: self.slits[0].0, high: self.slits[0].1 };
             let mut count = 1;
             for (x, &(low, high)) in self.slits.iter().enumerate().skip(1) {
-                let rise = 0.5 * add as f64 * x as f64;
+                let rise = 0.5 * add * x as f64;
                 let next =
                     Candidate { add, low: reached.low.max(low - rise), high: reached.high.min(high - rise) };
                 if !has_integer(next.low, next.high) {
@@ -272,6 +284,7 @@ impl Hull {
     }
 
     /// The line from (x, y) that touches the chain; `better` says whether a slope replaces the best so far.
+    #[inline]
     fn tangent(&mut self, x: f64, y: f64, better: impl Fn(f64, f64) -> bool) -> Line {
         let slope_of = |(px, py): (f64, f64)| (y - py) / (x - px);
         let mut slope = slope_of(self.points[self.pivot]);
@@ -287,6 +300,7 @@ impl Hull {
     }
 
     /// Adds a point on the right; points that `is_inside` (by the turn of the chain at them) drop out.
+    #[inline]
     fn add(&mut self, x: f64, y: f64, is_inside: impl Fn(f64) -> bool) {
         while self.points.len() >= self.pivot + 2 {
             let (ax, ay) = self.points[self.points.len() - 2];
@@ -299,6 +313,16 @@ impl Hull {
         }
         self.points.push((x, y));
     }
+}
+
+/// The smaller of two numbers. Unlike `f64::min` it is one instruction, as it need not care for NaN.
+pub(crate) fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger of two numbers; see [`smaller`].
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// Whether an integer lies in `low ..= high`.
