@@ -50,9 +50,11 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
         deframer.push(bytes, |frame| core.frame(board, frame));
     }
 
-    /// Runs every timer that is due (not later than [`Board::now`]) and returns the clock at which to call it again
-    /// (there always is one: the clock has to be looked at). Called from the timer interrupt on a chip, by the event loop in a simulation; and whenever bytes have been received, since
-    /// they may have started an earlier timer.
+    /// Runs every timer that is due (not later than [`Board::now`]) and returns the clock at which to call it again,
+    /// which is later than now; there always is one, for the clock has to be looked at every few seconds.
+    ///
+    /// Called from the timer interrupt on a chip, by the event loop in a simulation; and whenever bytes have been
+    /// received, since they may have started an earlier timer.
     pub fn run_timers(&mut self, board: &mut impl Board) -> Clock32 {
         self.core.run_timers(board)
     }
@@ -252,6 +254,8 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     }
 
     /// Stops everything. Nothing leads out of it but the host's `clear_shutdown`, `config_reset` or `reset`.
+    #[cold]
+    #[inline(never)]
     pub(crate) fn shut_down(&mut self, board: &mut impl Board, reason: ShutdownReason) {
         if self.halt.enter(reason, board.now()) {
             self.stop_everything(board);

@@ -60,6 +60,7 @@ impl<const N: usize> Timers<N> {
     }
 
     /// Stops a timer; nothing happens when it does not run.
+    #[inline(never)]
     pub(crate) fn cancel(&mut self, id: u8) {
         let Some(node) = self.nodes.get_mut(usize::from(id)).filter(|node| node.active) else { return };
         node.active = false;

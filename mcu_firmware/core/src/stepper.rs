@@ -3,6 +3,9 @@
 //! A step's rising edge comes at its clock; the falling edge is a timer of its own `pulse_ticks` later, so that
 //! nothing ever waits. The pin then stays low for as long again before the next edge, which is also what a change of
 //! direction is given to settle: the direction changes when the last pulse of the old one has ended.
+//!
+//! Steps are due on the clock that the host plans with, pulses are as long as the driver's data sheet wants: where the
+//! two clocks differ (a motion clock that slows down), `step_clock` is of the first and the rest of the second.
 
 use units::Clock32;
 use wire::ShutdownReason;
@@ -10,7 +13,6 @@ use wire::ShutdownReason;
 use crate::{
     board::{Board, Pin},
     moves::{MovePool, Queue, StepMove},
-    objects::After,
 };
 
 pub(crate) struct Stepper {
@@ -103,6 +105,7 @@ impl Stepper {
     }
 
     /// Takes the next row off the queue; `false` when there is none.
+    #[inline(never)]
     fn load<const M: usize>(&mut self, board: &mut impl Board, moves: &mut MovePool<M>) -> bool {
         let Some(row) = moves.pop::<StepMove>(&mut self.queue) else { return false };
         self.interval = row.interval;

@@ -131,7 +131,7 @@ fn the_configuration_is_kept_until_it_is_reset() {
 #[test]
 fn a_board_with_less_memory_says_so() {
     let mut bench = Bench::at(0);
-    bench.firmware = Box::new(firmware_core::Firmware::new(CLOCK).with_move_count(3));
+    *bench.firmware = firmware_core::Firmware::new(CLOCK).with_move_count(3);
     bench.send_all(&[Command::AllocateOids { count: 1 }, stepper(0), Command::FinalizeConfig { crc: 1 }]);
     assert_eq!(config(&mut bench).3, 3);
     for _ in 0..4 {
