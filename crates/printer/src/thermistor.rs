@@ -140,7 +140,7 @@ impl SensorCurve {
 
     /// The Beta equation through one point: R = R₀·exp(β·(1/T − 1/T₀)), `beta` in kelvin.
     pub fn from_beta(temperature: Celsius, resistance: Ohms, beta: f64) -> Result<Self, ThermistorError> {
-        if !is_possible(temperature, resistance) || !(beta.is_finite() && beta > 0.0) {
+        if !(is_possible(temperature, resistance) && beta.is_finite() && beta > 0.0) {
             return Err(ThermistorError::OutOfRange);
         }
         let b = 1.0 / beta;

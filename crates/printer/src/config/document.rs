@@ -47,10 +47,6 @@ impl Document {
         self.sections.get(section)?.entries.get(key)
     }
 
-    pub(super) fn has(&self, name: &str) -> bool {
-        self.sections.contains_key(name)
-    }
-
     /// The names of all sections of a kind, in alphabetical order.
     pub(super) fn names_starting_with(&self, prefix: &str) -> Vec<String> {
         self.sections.keys().filter(|name| name.starts_with(prefix)).cloned().collect()

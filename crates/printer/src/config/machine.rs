@@ -4,7 +4,7 @@ use units::{Mm, MmPerS, MmPerS2, Seconds};
 
 use super::Builder;
 use super::diagnostics::excerpt;
-use super::reader::Range;
+use super::reader::{Checked, Range};
 
 /// The board. Which port it is on is the shell's to know; the name is kept for display.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,10 +65,12 @@ pub struct FirmwareRetraction {
 const BAUD_DEFAULT: u32 = 250_000;
 const VELOCITY_MAX: f64 = 10_000.0;
 const ACCEL_MAX: f64 = 1_000_000.0;
+/// At 1 the head could not speed up at all.
+const MINIMUM_CRUISE_RATIO_MAX: f64 = 0.999_999;
 /// A week: longer means "never", which a heater must not have.
 const IDLE_TIMEOUT_MAX_S: f64 = 604_800.0;
 
-pub(super) fn mcu(builder: &mut Builder<'_>) -> Option<McuConfig> {
+pub(super) fn mcu(builder: &mut Builder<'_>) -> Checked<McuConfig> {
     let mut reader = builder.required_section("mcu")?;
     let serial = reader.text("serial");
     let canbus = reader.text("canbus_uuid");
@@ -78,7 +80,7 @@ pub(super) fn mcu(builder: &mut Builder<'_>) -> Option<McuConfig> {
         "connecting and restarting are done by whoever opens the port",
     );
     reader.finish();
-    Some(McuConfig { serial: serial.or(canbus).unwrap_or_default(), baud: baud? })
+    Ok(McuConfig { serial: serial.or(canbus).unwrap_or_default(), baud: baud? })
 }
 
 /// Reports a machine of another kind. Its other sections mean other things, so judging them would only add noise.
@@ -92,30 +94,29 @@ pub(super) fn is_other_kinematics(builder: &mut Builder<'_>) -> bool {
     true
 }
 
-pub(super) fn printer(builder: &mut Builder<'_>) -> Option<MachineConfig> {
+pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
     let mut reader = builder.required_section("printer")?;
     let kinematics = reader.required_text("kinematics").map(|_| Kinematics::Cartesian);
     let max_velocity = reader.number("max_velocity", Range::above(0.0).to(VELOCITY_MAX));
     let max_accel = reader.number("max_accel", Range::above(0.0).to(ACCEL_MAX));
     let corner = reader.number_or("square_corner_velocity", 5.0, Range::from(0.0).to(VELOCITY_MAX));
-    let mut cruise = reader.number_or("minimum_cruise_ratio", 0.5, Range::from(0.0).to(0.999_999));
+    let mut cruise =
+        reader.number_or("minimum_cruise_ratio", 0.5, Range::from(0.0).to(MINIMUM_CRUISE_RATIO_MAX));
     let old_decel = reader.optional_number("max_accel_to_decel", Range::above(0.0));
-    if let (Some(Some(decel)), Some(accel), false) =
-        (old_decel, max_accel, reader.has("minimum_cruise_ratio"))
-    {
-        let ratio = (1.0 - decel / accel).max(0.0);
+    if let (Ok(Some(decel)), Ok(accel), false) = (old_decel, max_accel, reader.has("minimum_cruise_ratio")) {
+        let ratio = (1.0 - decel / accel).clamp(0.0, MINIMUM_CRUISE_RATIO_MAX);
         reader.warning(
             "max_accel_to_decel",
             format!("an old name, read as `minimum_cruise_ratio: {ratio:.3}`; write that instead"),
         );
-        cruise = Some(ratio);
+        cruise = Ok(ratio);
     }
     let max_z_velocity = reader.optional_number("max_z_velocity", Range::above(0.0).to(VELOCITY_MAX));
     let max_z_accel = reader.optional_number("max_z_accel", Range::above(0.0).to(ACCEL_MAX));
     reader.finish();
     let (max_velocity, max_accel) = (max_velocity?, max_accel?);
     old_decel?;
-    Some(MachineConfig {
+    Ok(MachineConfig {
         kinematics: kinematics?,
         max_velocity: MmPerS(max_velocity),
         max_accel: MmPerS2(max_accel),
@@ -127,25 +128,25 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Option<MachineConfig> {
     })
 }
 
-pub(super) fn idle_timeout(builder: &mut Builder<'_>) -> Option<IdleTimeoutConfig> {
+pub(super) fn idle_timeout(builder: &mut Builder<'_>) -> Checked<IdleTimeoutConfig> {
     const DEFAULT_S: f64 = 600.0;
     let Some(mut reader) = builder.section("idle_timeout") else {
-        return Some(IdleTimeoutConfig { timeout: Seconds(DEFAULT_S) });
+        return Ok(IdleTimeoutConfig { timeout: Seconds(DEFAULT_S) });
     };
     let timeout = reader.number_or("timeout", DEFAULT_S, Range::above(0.0).to(IDLE_TIMEOUT_MAX_S));
     reader.not_supported(&["gcode"], "heaters and motors are switched off instead of running these commands");
     reader.finish();
-    Some(IdleTimeoutConfig { timeout: Seconds(timeout?) })
+    Ok(IdleTimeoutConfig { timeout: Seconds(timeout?) })
 }
 
-pub(super) fn firmware_retraction(builder: &mut Builder<'_>) -> Option<Option<FirmwareRetraction>> {
-    let Some(mut reader) = builder.section("firmware_retraction") else { return Some(None) };
+pub(super) fn firmware_retraction(builder: &mut Builder<'_>) -> Checked<Option<FirmwareRetraction>> {
+    let Some(mut reader) = builder.section("firmware_retraction") else { return Ok(None) };
     let retract_length = reader.number_or("retract_length", 0.0, Range::from(0.0).to(1_000.0));
     let retract_speed = reader.number_or("retract_speed", 20.0, Range::from(1.0).to(VELOCITY_MAX));
     let extra = reader.number_or("unretract_extra_length", 0.0, Range::from(0.0).to(1_000.0));
     let unretract_speed = reader.number_or("unretract_speed", 10.0, Range::from(1.0).to(VELOCITY_MAX));
     reader.finish();
-    Some(Some(FirmwareRetraction {
+    Ok(Some(FirmwareRetraction {
         retract_length: Mm(retract_length?),
         retract_speed: MmPerS(retract_speed?),
         unretract_extra_length: Mm(extra?),
@@ -153,8 +154,8 @@ pub(super) fn firmware_retraction(builder: &mut Builder<'_>) -> Option<Option<Fi
     }))
 }
 
-pub(super) fn force_move(builder: &mut Builder<'_>) -> Option<bool> {
-    let Some(mut reader) = builder.section("force_move") else { return Some(false) };
+pub(super) fn force_move(builder: &mut Builder<'_>) -> Checked<bool> {
+    let Some(mut reader) = builder.section("force_move") else { return Ok(false) };
     let enabled = reader.boolean_or("enable_force_move", false);
     reader.finish();
     enabled

@@ -25,7 +25,7 @@ pub use stepper::{MotorConfig, StepperConfig};
 pub use thermal::{ControlConfig, ExtruderConfig, FanConfig, HeaterConfig};
 
 use diagnostics::Log;
-use reader::{PinRegistry, Reader};
+use reader::{Checked, PinRegistry, Reader, Reported};
 
 /// A whole machine, checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,7 +62,7 @@ impl PrinterConfig {
 pub fn parse(text: &str) -> (Option<PrinterConfig>, Vec<ConfigDiagnostic>) {
     let mut log = Log::default();
     let config = build(text, &mut log);
-    let config = config.filter(|_| !log.has_errors());
+    let config = config.ok().filter(|_| !log.has_errors());
     (config, log.into_diagnostics())
 }
 
@@ -77,24 +77,28 @@ impl Builder<'_> {
     /// A section that may be missing.
     fn section(&mut self, name: &str) -> Option<Reader<'_>> {
         let section = self.document.take(name)?;
-        Some(Reader::new(section, &mut self.pins, self.log))
+        Some(self.reader(section))
     }
 
     /// A section that must be there.
-    fn required_section(&mut self, name: &str) -> Option<Reader<'_>> {
+    fn required_section(&mut self, name: &str) -> Checked<Reader<'_>> {
         let Some(section) = self.document.take(name) else {
             self.log.error(0, format!("[{name}] is missing: every printer.cfg needs that section"));
-            return None;
+            return Err(Reported);
         };
-        Some(Reader::new(section, &mut self.pins, self.log))
+        Ok(self.reader(section))
+    }
+
+    fn reader(&mut self, section: document::Section) -> Reader<'_> {
+        Reader::new(section, &mut self.pins, self.log)
     }
 }
 
-fn build(text: &str, log: &mut Log) -> Option<PrinterConfig> {
+fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
     let document = document::read(text, log);
     let mut builder = Builder { document, pins: PinRegistry::default(), log };
     if machine::is_other_kinematics(&mut builder) {
-        return None;
+        return Err(Reported);
     }
     // All sections are read before the first missing one ends this, so that one reading shows every mistake.
     let mcu = machine::mcu(&mut builder);
@@ -103,7 +107,7 @@ fn build(text: &str, log: &mut Log) -> Option<PrinterConfig> {
     let y = stepper::axis(&mut builder, "stepper_y");
     let z = stepper::axis(&mut builder, "stepper_z");
     let custom = thermal::custom_sensors(&mut builder);
-    let limits = printer.as_ref().map(|printer| (printer.max_velocity, printer.max_accel));
+    let limits = printer.map(|printer| (printer.max_velocity, printer.max_accel));
     let extruder = thermal::extruder(&mut builder, &custom, limits);
     let heater_bed = thermal::heater_bed(&mut builder, &custom);
     let fan = thermal::fan(&mut builder);
@@ -111,7 +115,7 @@ fn build(text: &str, log: &mut Log) -> Option<PrinterConfig> {
     let firmware_retraction = machine::firmware_retraction(&mut builder);
     let force_move = machine::force_move(&mut builder);
     rest::report(builder.document.into_rest(), builder.log);
-    Some(PrinterConfig {
+    Ok(PrinterConfig {
         mcu: mcu?,
         printer: printer?,
         steppers: [x?, y?, z?],

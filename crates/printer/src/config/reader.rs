@@ -52,10 +52,18 @@ const NUMBER_MAX: f64 = 1e7;
 /// Longest option name for which a similar one is sought.
 const SUGGESTION_BYTES_MAX: usize = 48;
 
+/// The value is missing or wrong, and the log says so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Reported;
+
+/// A value that was checked, or was found wrong and reported.
+pub(super) type Checked<T> = Result<T, Reported>;
+
 /// Which option took which pin: two must not share one.
 #[derive(Debug, Default)]
 pub(super) struct PinRegistry {
-    taken: BTreeMap<String, String>,
+    /// By the pin's name: the option, and the words for it.
+    taken: BTreeMap<String, (&'static str, String)>,
 }
 
 /// One section being read.
@@ -85,10 +93,11 @@ impl<'a> Reader<'a> {
         self.section.entries.get(key).map_or(self.section.line, |entry| entry.line)
     }
 
-    /// Reports an error of an option that is about more than its own value.
-    pub(super) fn error(&mut self, key: &str, problem: impl core::fmt::Display) {
+    /// Reports an error of an option.
+    pub(super) fn error(&mut self, key: &str, problem: impl core::fmt::Display) -> Reported {
         let line = self.line_of(key);
         self.log.error(line, format!("[{}] {key}: {problem}", excerpt(&self.section.name)));
+        Reported
     }
 
     pub(super) fn warning(&mut self, key: &str, problem: impl core::fmt::Display) {
@@ -112,137 +121,106 @@ impl<'a> Reader<'a> {
     }
 
     /// The text of an option that must be there.
-    pub(super) fn required_text(&mut self, key: &'static str) -> Option<String> {
-        let text = self.value(key);
-        if text.is_none() {
-            self.missing(key);
-        }
-        text
+    pub(super) fn required_text(&mut self, key: &'static str) -> Checked<String> {
+        self.value(key).ok_or_else(|| {
+            let problem = if self.has(key) { "it has no value" } else { "it is missing" };
+            self.error(key, format!("{problem}; write {}", hint(key)))
+        })
     }
 
-    fn missing(&mut self, key: &str) {
-        let problem = if self.has(key) { "it has no value" } else { "it is missing" };
-        self.error(key, format!("{problem}; write {}", hint(key)));
-    }
-
-    fn number_from(&mut self, key: &str, text: &str, range: Range) -> Option<f64> {
+    fn number_from(&mut self, key: &str, text: &str, range: Range) -> Checked<f64> {
         let Ok(value) = text.parse::<f64>() else {
-            self.error(key, format!("`{}` is not a number; write {}", excerpt(text), hint(key)));
-            return None;
+            return Err(self.error(key, format!("`{}` is not a number; write {}", excerpt(text), hint(key))));
         };
         // Not a number is in no range.
-        if !range.contains(value) {
-            let words = range.in_words();
-            self.error(key, format!("`{}` must be {words}; write {}", excerpt(text), hint(key)));
-            return None;
+        if range.contains(value) {
+            return Ok(value);
         }
-        Some(value)
+        let words = range.in_words();
+        Err(self.error(key, format!("`{}` must be {words}; write {}", excerpt(text), hint(key))))
     }
 
     /// A number that must be there.
-    pub(super) fn number(&mut self, key: &'static str, range: Range) -> Option<f64> {
+    pub(super) fn number(&mut self, key: &'static str, range: Range) -> Checked<f64> {
         let text = self.required_text(key)?;
         self.number_from(key, &text, range)
     }
 
-    /// A number with a default; a wrong one is reported and none.
-    pub(super) fn number_or(&mut self, key: &'static str, default: f64, range: Range) -> Option<f64> {
-        match self.text(key) {
-            Some(text) => self.number_from(key, &text, range),
-            None => Some(default),
-        }
+    /// A number with a default.
+    pub(super) fn number_or(&mut self, key: &'static str, default: f64, range: Range) -> Checked<f64> {
+        self.optional_number(key, range).map(|value| value.unwrap_or(default))
     }
 
-    /// A number that may be missing: `Some(None)` then, `None` where it is wrong.
-    pub(super) fn optional_number(&mut self, key: &'static str, range: Range) -> Option<Option<f64>> {
-        match self.text(key) {
-            Some(text) => self.number_from(key, &text, range).map(Some),
-            None => Some(None),
-        }
+    /// A number that may be missing.
+    pub(super) fn optional_number(&mut self, key: &'static str, range: Range) -> Checked<Option<f64>> {
+        self.text(key).map(|text| self.number_from(key, &text, range)).transpose()
     }
 
-    fn integer_from(&mut self, key: &str, text: &str, min: u32, max: u32) -> Option<u32> {
-        let value = text.parse::<u32>().ok().filter(|value| (min..=max).contains(value));
-        if value.is_none() {
-            let problem = format!(
-                "`{}` must be a whole number from {min} to {max}; write {}",
-                excerpt(text),
-                hint(key)
-            );
-            self.error(key, problem);
-        }
-        value
+    fn integer_from(&mut self, key: &str, text: &str, min: u32, max: u32) -> Checked<u32> {
+        text.parse::<u32>().ok().filter(|value| (min..=max).contains(value)).ok_or_else(|| {
+            let text = excerpt(text);
+            let problem = format!("`{text}` must be a whole number from {min} to {max}; write {}", hint(key));
+            self.error(key, problem)
+        })
     }
 
-    pub(super) fn integer(&mut self, key: &'static str, min: u32, max: u32) -> Option<u32> {
+    /// A whole number that must be there.
+    pub(super) fn integer(&mut self, key: &'static str, min: u32, max: u32) -> Checked<u32> {
         let text = self.required_text(key)?;
         self.integer_from(key, &text, min, max)
     }
 
-    pub(super) fn integer_or(&mut self, key: &'static str, default: u32, min: u32, max: u32) -> Option<u32> {
-        match self.text(key) {
-            Some(text) => self.integer_from(key, &text, min, max),
-            None => Some(default),
-        }
+    /// A whole number with a default.
+    pub(super) fn integer_or(&mut self, key: &'static str, default: u32, min: u32, max: u32) -> Checked<u32> {
+        self.text(key).map_or(Ok(default), |text| self.integer_from(key, &text, min, max))
     }
 
-    /// A switch that may be missing: `Some(None)` then, `None` where it is wrong.
-    pub(super) fn optional_boolean(&mut self, key: &'static str) -> Option<Option<bool>> {
-        let Some(text) = self.text(key) else { return Some(None) };
+    /// A switch that may be missing.
+    pub(super) fn optional_boolean(&mut self, key: &'static str) -> Checked<Option<bool>> {
+        let Some(text) = self.text(key) else { return Ok(None) };
         match text.to_ascii_lowercase().as_str() {
-            "1" | "yes" | "true" | "on" => Some(Some(true)),
-            "0" | "no" | "false" | "off" => Some(Some(false)),
-            _ => {
-                self.error(key, format!("`{}` must be true or false", excerpt(&text)));
-                None
-            }
+            "1" | "yes" | "true" | "on" => Ok(Some(true)),
+            "0" | "no" | "false" | "off" => Ok(Some(false)),
+            _ => Err(self.error(key, format!("`{}` must be true or false", excerpt(&text)))),
         }
     }
 
-    pub(super) fn boolean_or(&mut self, key: &'static str, default: bool) -> Option<bool> {
+    /// A switch with a default.
+    pub(super) fn boolean_or(&mut self, key: &'static str, default: bool) -> Checked<bool> {
         self.optional_boolean(key).map(|value| value.unwrap_or(default))
     }
 
-    fn pin_from(&mut self, key: &'static str, text: &str, usage: PinUse) -> Option<PinSpec> {
-        let line = self.line_of(key);
-        match PinSpec::parse(text, line, usage) {
-            Ok(pin) => {
-                self.claim(key, &pin);
-                Some(pin)
-            }
-            Err(advice) => {
-                self.error(key, format!("`{}` is not a pin that can be used here: {advice}", excerpt(text)));
-                None
-            }
-        }
+    fn pin_from(&mut self, key: &'static str, text: &str, usage: PinUse) -> Checked<PinSpec> {
+        let pin = PinSpec::parse(text, self.line_of(key), usage).map_err(|advice| {
+            self.error(key, format!("`{}` is not a pin that can be used here: {advice}", excerpt(text)))
+        })?;
+        self.claim(key, &pin)?;
+        Ok(pin)
     }
 
     /// Drivers often share one enable line; any other pin with two jobs is a mistake.
-    fn claim(&mut self, key: &'static str, pin: &PinSpec) {
+    fn claim(&mut self, key: &'static str, pin: &PinSpec) -> Checked<()> {
         let user = format!("[{}] {key} (line {})", excerpt(&self.section.name), pin.line);
-        match self.pins.taken.get(&pin.name) {
-            Some(other) if !(key == "enable_pin" && other.contains("] enable_pin ")) => {
-                let problem = format!("pin {} is already used by {other}; each pin has one job", pin.name);
-                self.error(key, problem);
-            }
-            Some(_) => {}
-            None => {
-                self.pins.taken.insert(pin.name.clone(), user);
-            }
+        let Some((other_key, other)) = self.pins.taken.get(&pin.name) else {
+            self.pins.taken.insert(pin.name.clone(), (key, user));
+            return Ok(());
+        };
+        if key == "enable_pin" && *other_key == key {
+            return Ok(());
         }
+        let problem = format!("pin {} is already used by {other}; each pin has one job", pin.name);
+        Err(self.error(key, problem))
     }
 
-    pub(super) fn pin(&mut self, key: &'static str, usage: PinUse) -> Option<PinSpec> {
+    /// A pin that must be there.
+    pub(super) fn pin(&mut self, key: &'static str, usage: PinUse) -> Checked<PinSpec> {
         let text = self.required_text(key)?;
         self.pin_from(key, &text, usage)
     }
 
-    /// A pin that may be missing: `Some(None)` then, `None` where it is wrong.
-    pub(super) fn optional_pin(&mut self, key: &'static str, usage: PinUse) -> Option<Option<PinSpec>> {
-        match self.text(key) {
-            Some(text) => self.pin_from(key, &text, usage).map(Some),
-            None => Some(None),
-        }
+    /// A pin that may be missing.
+    pub(super) fn optional_pin(&mut self, key: &'static str, usage: PinUse) -> Checked<Option<PinSpec>> {
+        self.text(key).map(|text| self.pin_from(key, &text, usage)).transpose()
     }
 
     /// Options of Klipper that have no effect here, and that nothing is lost by.
@@ -278,7 +256,9 @@ impl<'a> Reader<'a> {
                 excerpt(key)
             );
             if let Some(similar) = most_similar(key, &self.asked) {
-                message.push_str(&format!("; did you mean `{similar}`?"));
+                message.push_str("; did you mean `");
+                message.push_str(similar);
+                message.push_str("`?");
             }
             self.log.warning(entry.line, message);
         }

@@ -5,7 +5,7 @@ use units::{Mm, MmPerS, Seconds};
 use super::Builder;
 use super::diagnostics::excerpt;
 use super::pin::{PinSpec, PinUse};
-use super::reader::{Range, Reader};
+use super::reader::{Checked, Range, Reader};
 
 /// A stepper motor and its driver.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,7 +79,7 @@ const STEP_DISTANCE_MIN_MM: f64 = 1e-5;
 const STEP_DISTANCE_MAX_MM: f64 = 10.0;
 
 /// The options that every motor has.
-pub(super) fn motor(reader: &mut Reader<'_>) -> Option<MotorConfig> {
+pub(super) fn motor(reader: &mut Reader<'_>) -> Checked<MotorConfig> {
     let step_pin = reader.pin("step_pin", PinUse::Output);
     let dir_pin = reader.pin("dir_pin", PinUse::Output);
     let enable_pin = reader.optional_pin("enable_pin", PinUse::Output);
@@ -88,12 +88,11 @@ pub(super) fn motor(reader: &mut Reader<'_>) -> Option<MotorConfig> {
     let full_steps = reader.integer_or("full_steps_per_rotation", 200, 4, 100_000);
     let gear_ratio = gear_ratio(reader);
     let pulse = reader.number_or("step_pulse_duration", STEP_PULSE_DEFAULT_S, Range::from(0.0).to(0.001));
-    if full_steps.is_some_and(|steps| steps % 4 != 0) {
-        reader.error(
+    if full_steps.is_ok_and(|steps| steps % 4 != 0) {
+        return Err(reader.error(
             "full_steps_per_rotation",
             "must be a multiple of 4: write 200 for a 1.8° motor, 400 for 0.9°",
-        );
-        return None;
+        ));
     }
     let motor = MotorConfig {
         step_pin: step_pin?,
@@ -107,101 +106,93 @@ pub(super) fn motor(reader: &mut Reader<'_>) -> Option<MotorConfig> {
     };
     let distance = motor.step_distance().0;
     if !(STEP_DISTANCE_MIN_MM..=STEP_DISTANCE_MAX_MM).contains(&distance) {
-        reader.error(
+        return Err(reader.error(
             "rotation_distance",
             format!("one microstep comes out as {distance:e} mm; check rotation_distance, microsteps and gear_ratio"),
-        );
-        return None;
+        ));
     }
-    Some(motor)
+    Ok(motor)
 }
 
 /// `57:11, 2:1`: the product of all pairs; 1 where there are none.
-fn gear_ratio(reader: &mut Reader<'_>) -> Option<f64> {
-    let Some(text) = reader.text("gear_ratio") else { return Some(1.0) };
+fn gear_ratio(reader: &mut Reader<'_>) -> Checked<f64> {
+    let Some(text) = reader.text("gear_ratio") else { return Ok(1.0) };
     let mut ratio = 1.0;
     for pair in text.split([',', '\n']) {
         let teeth =
             |side: &str| side.trim().parse::<f64>().ok().filter(|teeth| *teeth > 0.0 && *teeth <= 1e6);
         let Some((driven, driving)) = pair.split_once(':').and_then(|(a, b)| Some((teeth(a)?, teeth(b)?)))
         else {
-            reader.error(
-                "gear_ratio",
-                format!("`{}` is not a pair of teeth; write driven:driving, e.g. 50:17", excerpt(pair)),
-            );
-            return None;
+            let problem = "is not a pair of teeth; write driven:driving, e.g. 50:17";
+            return Err(reader.error("gear_ratio", format!("`{}` {problem}", excerpt(pair))));
         };
         ratio *= driven / driving;
     }
     if (1e-4..=1e4).contains(&ratio) {
-        return Some(ratio);
+        return Ok(ratio);
     }
-    reader
-        .error("gear_ratio", format!("`{}` makes no gear; write driven:driving, e.g. 50:17", excerpt(&text)));
-    None
+    let problem = "makes no gear; write driven:driving, e.g. 50:17";
+    Err(reader.error("gear_ratio", format!("`{}` {problem}", excerpt(&text))))
 }
 
+#[derive(Clone, Copy)]
 struct Span {
     min: f64,
     max: f64,
     endstop: f64,
 }
 
-fn span(reader: &mut Reader<'_>) -> Option<Span> {
+fn span(reader: &mut Reader<'_>) -> Checked<Span> {
     let anywhere = Range::from(-POSITION_MAX_MM).to(POSITION_MAX_MM);
     let min = reader.number_or("position_min", 0.0, anywhere);
     let max = reader.number("position_max", anywhere);
     let endstop = reader.number("position_endstop", anywhere);
     let (min, max) = (min?, max?);
     if max <= min {
-        reader.error("position_max", format!("{max} must be above position_min, which is {min}"));
-        return None;
+        return Err(reader.error("position_max", format!("{max} must be above position_min, which is {min}")));
     }
     let endstop = endstop?;
     if !(min..=max).contains(&endstop) {
-        reader.error(
+        return Err(reader.error(
             "position_endstop",
             format!("{endstop} must lie within position_min and position_max, {min} to {max}"),
-        );
-        return None;
+        ));
     }
-    Some(Span { min, max, endstop })
+    Ok(Span { min, max, endstop })
 }
 
 /// Towards which end homing goes; not written, it is the end whose quarter of the axis holds the endstop.
-fn homing_direction(reader: &mut Reader<'_>, span: Option<&Span>) -> Option<bool> {
+fn homing_direction(reader: &mut Reader<'_>, span: Checked<Span>) -> Checked<bool> {
     let said = reader.optional_boolean("homing_positive_dir")?;
-    let Span { min, max, endstop } = *span?;
+    let Span { min, max, endstop } = span?;
     let quarter = (max - min) / 4.0;
     let positive = match said {
         Some(positive) => positive,
         None if endstop <= min + quarter => false,
         None if endstop >= max - quarter => true,
         None => {
-            reader.error(
+            return Err(reader.error(
                 "homing_positive_dir",
                 "the endstop lies in the middle of the axis, so the direction of homing is unclear; \
                  write `homing_positive_dir: true` or `false`",
-            );
-            return None;
+            ));
         }
     };
     if (positive && endstop == min) || (!positive && endstop == max) {
-        reader.error(
+        return Err(reader.error(
             "homing_positive_dir",
             "homing would move away from the endstop; correct it or position_endstop",
-        );
-        return None;
+        ));
     }
-    Some(positive)
+    Ok(positive)
 }
 
-pub(super) fn axis(builder: &mut Builder<'_>, name: &str) -> Option<StepperConfig> {
+pub(super) fn axis(builder: &mut Builder<'_>, name: &str) -> Checked<StepperConfig> {
     let mut reader = builder.required_section(name)?;
     let motor = motor(&mut reader);
     let endstop_pin = reader.pin("endstop_pin", PinUse::Input);
     let span = span(&mut reader);
-    let homing_positive_dir = homing_direction(&mut reader, span.as_ref());
+    let homing_positive_dir = homing_direction(&mut reader, span);
     let speed = Range::above(0.0).to(HOMING_SPEED_MAX);
     let homing_speed = reader.number_or("homing_speed", 5.0, speed);
     let second = reader.optional_number("second_homing_speed", speed);
@@ -209,7 +200,7 @@ pub(super) fn axis(builder: &mut Builder<'_>, name: &str) -> Option<StepperConfi
     let retract_dist = reader.number_or("homing_retract_dist", 5.0, Range::from(0.0).to(1_000.0));
     reader.finish();
     let (span, homing_speed) = (span?, homing_speed?);
-    Some(StepperConfig {
+    Ok(StepperConfig {
         name: name.to_owned(),
         motor: motor?,
         endstop_pin: endstop_pin?,

@@ -7,7 +7,7 @@ use units::{Celsius, Mm, MmPerS, MmPerS2, Ohms, Seconds};
 use super::Builder;
 use super::diagnostics::excerpt;
 use super::pin::{PinSpec, PinUse};
-use super::reader::{Range, Reader};
+use super::reader::{Checked, Range, Reader};
 use super::stepper::{MotorConfig, motor};
 use crate::heater::{PidGains, VerifyHeaterConfig};
 use crate::thermistor::{PULLUP_DEFAULT, SensorCurve, Thermistor};
@@ -127,7 +127,7 @@ impl FanConfig {
 }
 
 /// `[thermistor NAME]` sections by NAME.
-pub(super) type CustomSensors = BTreeMap<String, Option<SensorCurve>>;
+pub(super) type CustomSensors = BTreeMap<String, Checked<SensorCurve>>;
 
 const ABSOLUTE_ZERO: f64 = -273.15;
 
@@ -146,7 +146,7 @@ pub(super) fn custom_sensors(builder: &mut Builder<'_>) -> CustomSensors {
     sensors
 }
 
-fn custom_sensor(reader: &mut Reader<'_>) -> Option<SensorCurve> {
+fn custom_sensor(reader: &mut Reader<'_>) -> Checked<SensorCurve> {
     let celsius = Range::above(ABSOLUTE_ZERO).to(TEMPERATURE_MAX);
     let ohms = Range::above(0.0).to(1e7);
     let first = (reader.number("temperature1", celsius), reader.number("resistance1", ohms));
@@ -167,16 +167,16 @@ fn custom_sensor(reader: &mut Reader<'_>) -> Option<SensorCurve> {
             points.map(|(temperature, resistance)| (Celsius(temperature), Ohms(resistance))),
         )
     };
-    result.map_err(|error| reader.error("temperature1", error)).ok()
+    result.map_err(|error| reader.error("temperature1", error))
 }
 
 struct Sensor {
-    sensor_type: String,
+    kind: String,
     pin: PinSpec,
     thermistor: Thermistor,
 }
 
-fn sensor(reader: &mut Reader<'_>, custom: &CustomSensors) -> Option<Sensor> {
+fn sensor(reader: &mut Reader<'_>, custom: &CustomSensors) -> Checked<Sensor> {
     let sensor_type = reader.required_text("sensor_type");
     let pin = reader.pin("sensor_pin", PinUse::Analog);
     let pullup = reader.number_or("pullup_resistor", PULLUP_DEFAULT.0, Range::above(0.0));
@@ -185,59 +185,48 @@ fn sensor(reader: &mut Reader<'_>, custom: &CustomSensors) -> Option<Sensor> {
     let curve = match custom.get(&sensor_type) {
         // A faulty section of its own was reported there.
         Some(sensor) => (*sensor)?,
-        None => SensorCurve::named(&sensor_type).or_else(|| {
-            let known: Vec<&str> = SensorCurve::names().collect();
-            reader.error(
-                "sensor_type",
-                format!(
-                    "`{}` is not supported; write one of: {}; or describe it in a [thermistor] section",
-                    excerpt(&sensor_type),
-                    known.join(", ")
-                ),
-            );
-            None
+        None => SensorCurve::named(&sensor_type).ok_or_else(|| {
+            let (name, known) = (excerpt(&sensor_type), SensorCurve::names().collect::<Vec<_>>().join(", "));
+            let advice = format!("write one of: {known}; or describe it in a [thermistor] section");
+            reader.error("sensor_type", format!("`{name}` is not supported; {advice}"))
         })?,
     };
     let thermistor = Thermistor { curve, pullup: Ohms(pullup?), inline: Ohms(inline?) };
-    Some(Sensor { sensor_type, pin: pin?, thermistor })
+    Ok(Sensor { kind: sensor_type, pin: pin?, thermistor })
 }
 
-fn control(reader: &mut Reader<'_>) -> Option<ControlConfig> {
-    let kind = reader.required_text("control");
-    if kind.as_deref() == Some("watermark") {
-        let max_delta = reader.number_or("max_delta", 2.0, Range::above(0.0).to(50.0));
-        let why = "the heater is controlled by watermark";
-        reader.without_effect(&["pid_kp", "pid_ki", "pid_kd"], why);
-        return Some(ControlConfig::Watermark { max_delta: Celsius(max_delta?) });
-    }
-    reader.without_effect(&["max_delta"], "the heater is controlled by PID");
+fn control(reader: &mut Reader<'_>) -> Checked<ControlConfig> {
     let gain = Range::from(0.0).to(1e6);
-    match kind.as_deref() {
-        Some("pid") => {
+    match reader.required_text("control").as_deref() {
+        Ok("watermark") => {
+            let max_delta = reader.number_or("max_delta", 2.0, Range::above(0.0).to(50.0));
+            reader.without_effect(&["pid_kp", "pid_ki", "pid_kd"], "the heater is controlled by watermark");
+            Ok(ControlConfig::Watermark { max_delta: Celsius(max_delta?) })
+        }
+        Ok("pid") => {
+            reader.without_effect(&["max_delta"], "the heater is controlled by PID");
             let kp = reader.number("pid_kp", gain);
             let ki = reader.number("pid_ki", gain);
             let kd = reader.number("pid_kd", gain);
-            Some(ControlConfig::Pid(PidGains { kp: kp?, ki: ki?, kd: kd? }))
+            Ok(ControlConfig::Pid(PidGains { kp: kp?, ki: ki?, kd: kd? }))
         }
         other => {
-            // Keeps the gains from being called unknown on top of the real mistake.
-            let _ = (reader.text("pid_kp"), reader.text("pid_ki"), reader.text("pid_kd"));
-            if let Some(other) = other {
-                reader
-                    .error("control", format!("`{}` is unknown; write `pid` or `watermark`", excerpt(other)));
-            }
-            None
+            // Keeps the options of either from being called unknown on top of the real mistake.
+            let _ = ["pid_kp", "pid_ki", "pid_kd", "max_delta"].map(|key| reader.text(key));
+            let problem =
+                format!("`{}` is unknown; write `pid` or `watermark`", excerpt(other.map_err(|r| *r)?));
+            Err(reader.error("control", problem))
         }
     }
 }
 
-/// The heater half of a section. The runaway check is filled in by the caller, from its own section.
+/// The heater half of a section; the runaway check has a section of its own.
 fn heater(
     reader: &mut Reader<'_>,
     custom: &CustomSensors,
-    verify: VerifyHeaterConfig,
+    verify: Checked<VerifyHeaterConfig>,
     extrudes: bool,
-) -> Option<HeaterConfig> {
+) -> Checked<HeaterConfig> {
     let heater_pin = reader.pin("heater_pin", PinUse::Output);
     let max_power = reader.number_or("max_power", 1.0, Range::above(0.0).to(1.0));
     let sensor = sensor(reader, custom);
@@ -246,18 +235,17 @@ fn heater(
     let cycle = reader.number_or("pwm_cycle_time", 0.1, Range::above(0.0).to(1.0));
     let min = reader.number("min_temp", Range::from(ABSOLUTE_ZERO).to(TEMPERATURE_MAX));
     let max = reader.number("max_temp", Range::above(0.0).to(TEMPERATURE_MAX));
-    let min_extrude = if extrudes { min_extrude_temp(reader, min, max) } else { Some(ABSOLUTE_ZERO) };
+    let min_extrude = if extrudes { min_extrude_temp(reader, min, max) } else { Ok(ABSOLUTE_ZERO) };
     let (min, max) = (min?, max?);
     if max <= min {
-        reader.error("max_temp", format!("{max} must be above min_temp, which is {min}"));
-        return None;
+        return Err(reader.error("max_temp", format!("{max} must be above min_temp, which is {min}")));
     }
     let sensor = sensor?;
-    Some(HeaterConfig {
+    Ok(HeaterConfig {
         name: reader.name().to_owned(),
         heater_pin: heater_pin?,
         max_power: max_power?,
-        sensor_type: sensor.sensor_type,
+        sensor_type: sensor.kind,
         sensor_pin: sensor.pin,
         thermistor: sensor.thermistor,
         control: control?,
@@ -266,34 +254,33 @@ fn heater(
         min_extrude_temp: Celsius(min_extrude?),
         smooth_time: Seconds(smooth_time?),
         pwm_cycle_time: Seconds(cycle?),
-        verify,
+        verify: verify?,
     })
 }
 
-fn min_extrude_temp(reader: &mut Reader<'_>, min: Option<f64>, max: Option<f64>) -> Option<f64> {
+fn min_extrude_temp(reader: &mut Reader<'_>, min: Checked<f64>, max: Checked<f64>) -> Checked<f64> {
     const DEFAULT: f64 = 170.0;
     let limit =
         reader.number_or("min_extrude_temp", DEFAULT, Range::from(ABSOLUTE_ZERO).to(TEMPERATURE_MAX))?;
     let (min, max) = (min?, max?);
     if (min..=max).contains(&limit) || max <= min {
-        return Some(limit);
+        return Ok(limit);
     }
     let problem = format!("{limit} must lie within min_temp and max_temp, {min} to {max}");
-    reader.error("min_extrude_temp", problem);
-    None
+    Err(reader.error("min_extrude_temp", problem))
 }
 
 /// `[verify_heater NAME]`, or the defaults for this kind of heater.
-fn verify_heater(builder: &mut Builder<'_>, heater: &str) -> Option<VerifyHeaterConfig> {
+fn verify_heater(builder: &mut Builder<'_>, heater: &str) -> Checked<VerifyHeaterConfig> {
     let default = if heater == "heater_bed" { VerifyHeaterConfig::BED } else { VerifyHeaterConfig::EXTRUDER };
-    let Some(mut reader) = builder.section(&format!("verify_heater {heater}")) else { return Some(default) };
+    let Some(mut reader) = builder.section(&format!("verify_heater {heater}")) else { return Ok(default) };
     // The upper ends keep the check alive: with larger numbers it would never speak in time.
     let max_error = reader.number_or("max_error", default.max_error_c_s, Range::from(0.0).to(10_000.0));
     let time = reader.number_or("check_gain_time", default.check_gain_time.0, Range::from(1.0).to(600.0));
     let hysteresis = reader.number_or("hysteresis", default.hysteresis.0, Range::from(0.0).to(50.0));
     let gain = reader.number_or("heating_gain", default.heating_gain.0, Range::above(0.0).to(50.0));
     reader.finish();
-    Some(VerifyHeaterConfig {
+    Ok(VerifyHeaterConfig {
         max_error_c_s: max_error?,
         check_gain_time: Seconds(time?),
         hysteresis: Celsius(hysteresis?),
@@ -309,7 +296,7 @@ struct FilamentLimits {
     accel: Option<f64>,
 }
 
-fn filament_limits(reader: &mut Reader<'_>) -> Option<FilamentLimits> {
+fn filament_limits(reader: &mut Reader<'_>) -> Checked<FilamentLimits> {
     let nozzle = reader.number("nozzle_diameter", Range::above(0.0).to(10.0));
     let filament = reader.number("filament_diameter", Range::above(0.0).to(20.0));
     let cross_section = reader.optional_number("max_extrude_cross_section", Range::above(0.0).to(10_000.0));
@@ -317,39 +304,35 @@ fn filament_limits(reader: &mut Reader<'_>) -> Option<FilamentLimits> {
     let accel = reader.optional_number("max_extrude_only_accel", Range::above(0.0).to(1_000_000.0));
     let (nozzle, filament) = (nozzle?, filament?);
     if filament < nozzle {
-        reader.error(
+        return Err(reader.error(
             "filament_diameter",
             format!("{filament} must not be below nozzle_diameter, which is {nozzle}"),
-        );
-        return None;
+        ));
     }
     let cross_section = cross_section?.unwrap_or(4.0 * nozzle * nozzle);
-    Some(FilamentLimits { nozzle, filament, cross_section, velocity: velocity?, accel: accel? })
+    Ok(FilamentLimits { nozzle, filament, cross_section, velocity: velocity?, accel: accel? })
 }
 
 pub(super) fn extruder(
     builder: &mut Builder<'_>,
     custom: &CustomSensors,
-    limits: Option<(MmPerS, MmPerS2)>,
-) -> Option<Option<ExtruderConfig>> {
-    if !builder.document.has("extruder") {
-        return Some(None);
-    }
+    limits: Checked<(MmPerS, MmPerS2)>,
+) -> Checked<Option<ExtruderConfig>> {
+    let Some(section) = builder.document.take("extruder") else { return Ok(None) };
     let verify = verify_heater(builder, "extruder");
-    let mut reader = builder.section("extruder")?;
+    let mut reader = builder.reader(section);
     let motor = motor(&mut reader);
-    let heater = heater(&mut reader, custom, verify.unwrap_or(VerifyHeaterConfig::EXTRUDER), true);
+    let heater = heater(&mut reader, custom, verify, true);
     let filament = filament_limits(&mut reader);
     let corner = reader.number_or("instantaneous_corner_velocity", 1.0, Range::from(0.0).to(1_000.0));
     let distance = reader.number_or("max_extrude_only_distance", 50.0, Range::from(0.0).to(100_000.0));
     let advance = reader.number_or("pressure_advance", 0.0, Range::from(0.0).to(10.0));
     let smooth = reader.number_or("pressure_advance_smooth_time", 0.040, Range::above(0.0).to(0.2));
     reader.finish();
-    verify?;
     let (filament, (max_velocity, max_accel)) = (filament?, limits?);
     // Filament may always go as fast as it must for the widest usual extrusion at full speed.
     let usual_ratio = 4.0 * filament.nozzle * filament.nozzle / circle_area(filament.filament);
-    Some(Some(ExtruderConfig {
+    Ok(Some(ExtruderConfig {
         motor: motor?,
         heater: heater?,
         nozzle_diameter: Mm(filament.nozzle),
@@ -364,20 +347,17 @@ pub(super) fn extruder(
     }))
 }
 
-pub(super) fn heater_bed(builder: &mut Builder<'_>, custom: &CustomSensors) -> Option<Option<HeaterConfig>> {
-    if !builder.document.has("heater_bed") {
-        return Some(None);
-    }
+pub(super) fn heater_bed(builder: &mut Builder<'_>, custom: &CustomSensors) -> Checked<Option<HeaterConfig>> {
+    let Some(section) = builder.document.take("heater_bed") else { return Ok(None) };
     let verify = verify_heater(builder, "heater_bed");
-    let mut reader = builder.section("heater_bed")?;
-    let heater = heater(&mut reader, custom, verify.unwrap_or(VerifyHeaterConfig::BED), false);
+    let mut reader = builder.reader(section);
+    let heater = heater(&mut reader, custom, verify, false);
     reader.finish();
-    verify?;
-    Some(Some(heater?))
+    Ok(Some(heater?))
 }
 
-pub(super) fn fan(builder: &mut Builder<'_>) -> Option<Option<FanConfig>> {
-    let Some(mut reader) = builder.section("fan") else { return Some(None) };
+pub(super) fn fan(builder: &mut Builder<'_>) -> Checked<Option<FanConfig>> {
+    let Some(mut reader) = builder.section("fan") else { return Ok(None) };
     let pin = reader.pin("pin", PinUse::Output);
     let max_power = reader.number_or("max_power", 1.0, Range::above(0.0).to(1.0));
     let shutdown_speed = reader.number_or("shutdown_speed", 0.0, Range::from(0.0).to(1.0));
@@ -389,7 +369,7 @@ pub(super) fn fan(builder: &mut Builder<'_>) -> Option<Option<FanConfig>> {
     let why = "the fan's turns are not measured yet";
     reader.without_effect(&["tachometer_pin", "tachometer_ppr", "tachometer_poll_interval"], why);
     reader.finish();
-    Some(Some(FanConfig {
+    Ok(Some(FanConfig {
         pin: pin?,
         max_power: max_power?,
         shutdown_speed: shutdown_speed?,
