@@ -166,6 +166,21 @@ fn waits_end_when_the_heater_has_settled_and_not_while_it_overshoots() {
 }
 
 #[test]
+fn a_noisy_converter_delays_no_wait_for_long() {
+    let mut bench = Bench::new(hot_end(), Plant::hot_end());
+    bench.run(1.0);
+    // What 12 bits behind 4.7 kΩ make of 205 °C, summed eight times: about ±0.3 °C, here at its ends.
+    bench.broken_sensor = Some(|sensor| sensor + 0.3 * libm::copysign(1.0, libm::sin(sensor * 1e4)));
+    bench.heater.set_target(Celsius(205.0)).unwrap();
+    while !bench.heater.is_settled() {
+        bench.run(SAMPLE);
+        assert!(bench.now < 200.0, "still waiting at {} °C", bench.plant.sensor);
+    }
+    let (low, high) = bench.run(60.0);
+    assert!(low > 203.0 && high < 207.0, "{low} to {high} after the wait");
+}
+
+#[test]
 fn the_bed_swings_around_its_target() {
     let mut bench = Bench::new(bed(), Plant::bed());
     bench.run(1.0);
