@@ -66,7 +66,6 @@ pub struct Checker {
     actions: Vec<Action>,
     found: Vec<Diagnostic>,
     nozzle: Celsius,
-    bed: Celsius,
     report: CheckReport,
 }
 
@@ -82,7 +81,6 @@ impl Checker {
             actions: Vec::new(),
             found: Vec::new(),
             nozzle: Celsius::ZERO,
-            bed: Celsius::ZERO,
             report: CheckReport::default(),
         }
     }
@@ -100,8 +98,9 @@ impl Checker {
         let line = self.report.lines;
         if self.report.moves == 0 {
             self.error(ErrorCode::FileEmpty, "the file makes no move".into(), None);
-        } else if self.nozzle > Celsius::ZERO || self.bed > Celsius::ZERO {
-            self.block(line, "the file ends with a heater still on: it was probably cut off".into());
+        } else if self.nozzle > Celsius::ZERO {
+            // Many files leave the bed to the idle time-out, but none ends with the nozzle hot.
+            self.block(line, "the file ends with the nozzle still hot: it was probably cut off".into());
         }
         self.report
     }
@@ -161,10 +160,7 @@ impl Checker {
             Action::Arc(arc) => arc.chords(CHORD_TOLERANCE).for_each(|chord| self.judge(&chord)),
             Action::Home { x, y, z } => self.home([x, y, z]),
             Action::SetTemperature { heater, target, .. } => self.target(heater, target, line),
-            Action::TurnOffHeaters => {
-                self.nozzle = Celsius::ZERO;
-                self.bed = Celsius::ZERO;
-            }
+            Action::TurnOffHeaters => self.nozzle = Celsius::ZERO,
             Action::MotorsOff { x, y, z, .. } => {
                 if let Some(guard) = &mut self.guard {
                     let off = [x, y, z];
@@ -212,10 +208,8 @@ impl Checker {
     }
 
     fn target(&mut self, heater: Heater, target: Celsius, line: LineNumber) {
-        match heater {
-            Heater::Tool(0) => self.nozzle = target,
-            Heater::Bed => self.bed = target,
-            _ => {}
+        if heater == Heater::Tool(0) {
+            self.nozzle = target;
         }
         let Some(config) = &self.config else { return };
         let limits = match heater {

@@ -17,7 +17,7 @@ use gcode::{
 };
 use motion::{Limits, LookAhead, MoveRequest, PlannedMove};
 use steps::{StepCommand, StepGenerator};
-use units::{Celsius, Hertz, MmPerS, Seconds};
+use units::{Celsius, Hertz, MmPerS, Seconds, Ticks};
 
 pub use guard::{ExtrusionPermit, Guard};
 pub use report::{MotorReport, PLAN_CLOCK, PlanReport, PlanStream};
@@ -218,6 +218,11 @@ impl Planner {
     /// Print time up to which moves have been planned in this run.
     pub const fn planned_until(&self) -> Seconds {
         self.planned_until
+    }
+
+    /// Run clock up to which step commands have been handed out.
+    pub fn generated_until(&self) -> Ticks {
+        self.generator.settled()
     }
 
     /// What the step generator counted so far.

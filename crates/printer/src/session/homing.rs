@@ -280,6 +280,13 @@ impl AxisHoming {
             trsync_oid: 0,
             trigger_reason: 0,
         });
+        // Armed anew without reports: it has nothing more to say.
+        board.control(&Command::TrsyncStart {
+            oid: self.oids.trsync.0,
+            report_clock: 0,
+            report_ticks: 0,
+            expire_reason: 0,
+        });
         self.abandon = true;
         self.enter(Stage::PositionAfter);
     }

@@ -110,7 +110,7 @@ impl Ready {
         if run.homing || run.end.is_some() || clock_now < run.start {
             return None;
         }
-        self.stream.queued_on_board(self.planner.planned_until(), clock_now, &self.board)
+        self.stream.queued_on_board(self.planner.generated_until(), clock_now, &self.board)
     }
 
     /// Whether nothing moves and nothing is about to.
@@ -356,7 +356,7 @@ impl Ready {
         self.planner.guard.extrusion = self.extrusion_permit();
         for _ in 0..PLAN_ITEMS_MAX {
             let clock_now = self.board.clock_at(now);
-            if !self.stream.wants_more(self.planner.planned_until(), clock_now, &self.board) {
+            if !self.stream.wants_more(self.planner.generated_until(), clock_now, &self.board) {
                 return Ok(());
             }
             // A run that has been planned is first made to its end.

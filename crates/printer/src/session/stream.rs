@@ -83,11 +83,11 @@ impl MotionStream {
     }
 
     /// Whether the planner should be asked for more.
-    pub(super) fn wants_more(&self, planned_until: Seconds, clock_now: Ticks, board: &Board) -> bool {
+    pub(super) fn wants_more(&self, generated_until: Ticks, clock_now: Ticks, board: &Board) -> bool {
         let has_room = |motor| board.link.room(Lane::Motion(motor as u8)) >= LANE_ROOM_MIN;
         self.timeline.len() < TIMELINE_MAX
             && (0..MOTORS).all(has_room)
-            && self.run.is_none_or(|run| run.start + board.ticks(planned_until) < clock_now + board.ticks(HORIZON))
+            && self.run.is_none_or(|run| run.start + generated_until < clock_now + board.ticks(HORIZON))
     }
 
     /// Whether the motion planned so far ends soon.
@@ -200,11 +200,11 @@ impl MotionStream {
     }
 
     /// How much motion the board has, in seconds from its clock: up to the first step that it has not acknowledged,
-    /// or to the end of what is planned. `None` where no run is being made.
-    pub(super) fn queued_on_board(&self, planned_until: Seconds, clock_now: Ticks, board: &Board) -> Option<Seconds> {
+    /// or to the end of what has been generated. `None` where no run is being made.
+    pub(super) fn queued_on_board(&self, generated_until: Ticks, clock_now: Ticks, board: &Board) -> Option<Seconds> {
         let run = self.run?;
-        let planned = run.end.unwrap_or(run.start + board.ticks(planned_until));
-        let until = board.link.motion_covered().map_or(planned, |covered| covered.min(planned));
+        let generated = run.end.unwrap_or(run.start + generated_until);
+        let until = board.link.motion_covered().map_or(generated, |covered| covered.min(generated));
         Some(board.clock.duration_of(until.saturating_sub(clock_now)))
     }
 }
