@@ -211,8 +211,10 @@ fn sin_turns(turns: f64) -> f64 {
     let a = 0.25 - (y.abs() - 0.25).abs();
     let x = a * TURN_RAD;
     let x2 = x * x;
-    let tail = 1.0 / 362_880.0 - x2 * (1.0 / 39_916_800.0);
-    let series = 1.0 - x2 * (1.0 / 6.0 - x2 * (1.0 / 120.0 - x2 * (1.0 / 5040.0 - x2 * tail)));
+    let x4 = x2 * x2;
+    // In pairs, so that the processor need not wait for one term after the other.
+    let low = (1.0 - x2 * (1.0 / 6.0)) + x4 * (1.0 / 120.0 - x2 * (1.0 / 5040.0));
+    let series = low + (x4 * x4) * (1.0 / 362_880.0 - x2 * (1.0 / 39_916_800.0));
     (x * series).copysign(y)
 }
 

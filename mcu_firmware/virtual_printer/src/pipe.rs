@@ -108,7 +108,6 @@ impl Pipe {
     fn send_damaged(&mut self, mut at: u64, parcel: &[u8]) {
         let mut len = 0;
         for &byte in parcel {
-            // Every byte draws the same number of times whatever the probabilities: faults do not shift each other.
             let delay = self.chance.chance(self.faults.delay);
             let drop = self.chance.chance(self.faults.drop);
             let duplicate = self.chance.chance(self.faults.duplicate);
@@ -208,14 +207,14 @@ mod tests {
     fn faults_hit_as_often_as_they_say() {
         let faults = ByteFaults { corrupt: 0.01, ..ByteFaults::default() };
         let mut pipe = pipe(LinkProfile::Usb, faults);
-        pipe.send(0, &[0; 100_000]);
+        pipe.send(0, &vec![0; 100_000]);
         let got = all(&mut pipe);
         let hit = got.iter().filter(|&&byte| byte != 0).count();
         assert!((850..1150).contains(&hit), "{hit}");
         assert!(got.iter().all(|byte| byte.count_ones() <= 1), "one bit a byte");
         let faults = ByteFaults { drop: 0.1, duplicate: 0.02, ..ByteFaults::default() };
         let mut pipe = self::pipe(LinkProfile::Usb, faults);
-        pipe.send(0, &[0; 100_000]);
+        pipe.send(0, &vec![0; 100_000]);
         let got = all(&mut pipe).len();
         assert!((91_000..92_600).contains(&got), "{got}");
     }

@@ -6,7 +6,7 @@
 //!
 //! Does not know a real clock, a port or a file.
 
-use crate::board::{Role, SimulatedBoard};
+use crate::board::{Axis, EndstopWiring, FanWiring, HeaterWiring, SimulatedBoard};
 use crate::faults::{Failure, FailureKind, Faults};
 use crate::heater::THERMAL_STEP_S;
 use crate::machine::{Machine, WiringError};
@@ -347,15 +347,10 @@ impl<R: Recorder> VirtualPrinter<R> {
         }
     }
 
-    fn endstop_view(&self, endstop: &crate::board::EndstopWiring) -> EndstopView {
+    fn endstop_view(&self, endstop: &EndstopWiring) -> EndstopView {
         let switch = self.board.axes[endstop.axis].motor.switches.get(endstop.switch);
         let closed = switch.is_some_and(|switch| switch.closed(self.board.clock));
         EndstopView { name: endstop.name.clone(), triggered: endstop.stuck.unwrap_or(closed) }
-    }
-
-    /// Whether anything is wired to the pin of this name.
-    pub fn is_wired(&self, pin: &str) -> bool {
-        self.board.profile.pin(pin).is_some_and(|pin| self.board.roles[usize::from(pin)] != Role::Nothing)
     }
 }
 
@@ -363,7 +358,7 @@ fn new_firmware(profile: &BoardProfile) -> Box<Firmware<OBJECTS_MAX, MOVES_MAX>>
     Box::new(Firmware::new(profile.clock).with_move_count(profile.move_count))
 }
 
-fn motor_view(axis: &crate::board::Axis) -> MotorView {
+fn motor_view(axis: &Axis) -> MotorView {
     let rotor = axis.motor.rotor();
     MotorView {
         name: axis.name.clone(),
@@ -376,7 +371,7 @@ fn motor_view(axis: &crate::board::Axis) -> MotorView {
     }
 }
 
-fn heater_view(heater: &crate::board::HeaterWiring) -> HeaterView {
+fn heater_view(heater: &HeaterWiring) -> HeaterView {
     HeaterView {
         name: heater.name.clone(),
         temperature: Celsius(heater.state.body_c),
@@ -385,6 +380,6 @@ fn heater_view(heater: &crate::board::HeaterWiring) -> HeaterView {
     }
 }
 
-fn fan_view(fan: &crate::board::FanWiring) -> FanView {
+fn fan_view(fan: &FanWiring) -> FanView {
     FanView { name: fan.name.clone(), duty: fan.state.duty, speed: fan.state.speed }
 }

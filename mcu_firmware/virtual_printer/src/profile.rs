@@ -124,7 +124,7 @@ impl BoardProfile {
             ("MCU".to_owned(), Constant::Text(self.mcu.to_owned())),
             number("CLOCK_FREQ", f64::from(self.clock.0)),
             number("ADC_MAX", f64::from(crate::thermistor::ADC_MAX)),
-            number("STATS_SUMSQ_BASE", 256.0),
+            number("STATS_SUMSQ_BASE", f64::from(firmware_core::STATS_SUMSQ_BASE)),
             number("PWM_MAX", 255.0),
         ];
         if let LinkProfile::Uart { baud, receive_window } = self.link {

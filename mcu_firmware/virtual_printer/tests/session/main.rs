@@ -1,0 +1,5 @@
+//! The virtual printer as a host meets it, through its public interface.
+
+mod board;
+mod host;
+mod motion;
