@@ -75,6 +75,8 @@ pub struct LinkStats {
     pub blocks_sent: u64,
     /// Times that something was sent again.
     pub retransmissions: u64,
+    /// Of these, how often because no answer came in time.
+    pub timeouts: u64,
     /// Valid blocks received.
     pub blocks_received: u64,
     /// Stretches of received bytes that were no block.
@@ -241,10 +243,12 @@ impl Link {
     /// board's clock as far as it is known.
     pub fn poll(&mut self, now: Seconds, clock_now: Ticks, out: &mut Vec<u8>) -> Option<Seconds> {
         let before = out.len();
-        let wake = if self.window.is_adopted() {
-            let again = self.window.resend(now.0, out);
-            self.stats.retransmissions += u64::from(again > 0);
-            self.stats.bytes_retransmitted += again as u64;
+        let wake = if self.window.is_adopted() || self.window.adopt(now.0) {
+            if let Some(resent) = self.window.resend(now.0, out) {
+                self.stats.retransmissions += 1;
+                self.stats.timeouts += u64::from(resent.timed_out);
+                self.stats.bytes_retransmitted += resent.bytes as u64;
+            }
             self.moves.release(clock_now);
             let held = self.send_blocks(now, clock_now, out);
             self.next_wake(now, clock_now, held)

@@ -10,9 +10,6 @@ use super::WINDOW_BLOCKS_MAX;
 pub(super) const RTO_S_MIN: f64 = 0.025;
 /// The longest, in seconds.
 pub(super) const RTO_S_MAX: f64 = 5.0;
-/// After this many blocks have been acknowledged since the last time-out, the time-out's doubling is forgotten, even
-/// though every one of them was sent twice and none could be timed (as on a line that garbles every second block).
-const BACKOFF_FORGOTTEN_AFTER_BLOCKS: u32 = 12;
 /// Doublings beyond this exceed [`RTO_S_MAX`] anyway.
 const BACKOFF_MAX: u32 = 8;
 
@@ -24,12 +21,11 @@ pub(super) struct RoundTrip {
     /// The shortest of late.
     floor: f64,
     backoff: u32,
-    acknowledged_since_timeout: u32,
 }
 
 impl RoundTrip {
     pub(super) const fn new() -> Self {
-        Self { smoothed: None, variation: 0.0, floor: 0.0, backoff: 0, acknowledged_since_timeout: 0 }
+        Self { smoothed: None, variation: 0.0, floor: 0.0, backoff: 0 }
     }
 
     /// A block that was sent once was answered after `rtt` seconds (RFC 6298, 2.2 and 2.3).
@@ -54,30 +50,38 @@ impl RoundTrip {
         self.backoff = 0;
     }
 
-    /// Blocks were acknowledged, timed or not.
-    pub(super) fn progress(&mut self, blocks: u32) {
-        self.acknowledged_since_timeout = self.acknowledged_since_timeout.saturating_add(blocks);
-        if self.acknowledged_since_timeout >= BACKOFF_FORGOTTEN_AFTER_BLOCKS {
-            self.backoff = 0;
+    /// A block that was sent more than once was answered, at least `since_last` seconds after what caused the answer.
+    ///
+    /// RFC 6298 would neither time it nor take the back-off back. But a line to a board is slow because it garbles
+    /// blocks, hardly ever because it is crowded, and where it garbles every second one few are sent only once.
+    pub(super) fn bound(&mut self, since_last: f64) {
+        let backoff = self.backoff.saturating_sub(1);
+        if self.smoothed.is_none_or(|smoothed| since_last > smoothed) {
+            self.sample(since_last);
         }
+        self.backoff = backoff;
     }
 
     /// Nothing came in time: the next time-out is twice as long.
     pub(super) fn timed_out(&mut self) {
         self.backoff = (self.backoff + 1).min(BACKOFF_MAX);
-        self.acknowledged_since_timeout = 0;
     }
 
     /// The retransmission time-out now, in seconds.
     pub(super) fn timeout_s(&self) -> f64 {
-        let base = self.smoothed.map_or(RTO_S_MIN, |smoothed| smoothed + 4.0 * self.variation);
-        let doubled = base.max(RTO_S_MIN) * f64::from(1_u32 << self.backoff);
+        let doubled = self.answer_s_max().max(RTO_S_MIN) * f64::from(1_u32 << self.backoff);
         doubled.min(RTO_S_MAX)
     }
 
-    /// A nak that comes sooner than this after a block was sent was caused by something sent before it.
+    /// No answer comes sooner than this after what caused it, in seconds.
     pub(super) fn answer_s_min(&self) -> f64 {
-        self.smoothed.map_or(0.0, |smoothed| f64::midpoint(self.floor, smoothed.min(2.0 * self.floor)))
+        const ALLOWANCE: f64 = 0.9;
+        ALLOWANCE * self.floor
+    }
+
+    /// No answer comes later than this after what caused it, in seconds.
+    pub(super) fn answer_s_max(&self) -> f64 {
+        self.smoothed.map_or(RTO_S_MIN, |smoothed| smoothed + 4.0 * self.variation)
     }
 
     /// The smoothed round-trip time, in seconds.
@@ -106,7 +110,7 @@ impl Loss {
 
     /// A block did not arrive.
     pub(super) fn lost(&mut self) {
-        const TOO_MANY: f64 = 0.6;
+        const TOO_MANY: f64 = 0.35;
         self.share += (1.0 - self.share) / LOSS_MEMORY_BLOCKS;
         if self.share > TOO_MANY {
             self.payload_bytes = (self.payload_bytes * 0.9).max(PAYLOAD_BYTES_LOWEST);
@@ -115,7 +119,7 @@ impl Loss {
 
     /// Blocks arrived.
     pub(super) fn arrived(&mut self, blocks: u32) {
-        const FEW: f64 = 0.3;
+        const FEW: f64 = 0.2;
         for _ in 0..blocks {
             self.share -= self.share / LOSS_MEMORY_BLOCKS;
             if self.share < FEW {
@@ -159,13 +163,39 @@ mod tests {
     }
 
     #[test]
-    fn blocks_that_cannot_be_timed_end_the_back_off_too() {
+    fn an_answer_to_a_block_sent_twice_takes_back_off_back_and_can_only_lengthen_the_time_out() {
         let mut round_trip = RoundTrip::new();
+        round_trip.sample(0.02);
+        let before = round_trip.timeout_s();
         round_trip.timed_out();
-        round_trip.progress(BACKOFF_FORGOTTEN_AFTER_BLOCKS - 1);
-        assert_eq!(round_trip.timeout_s(), 2.0 * RTO_S_MIN);
-        round_trip.progress(1);
-        assert_eq!(round_trip.timeout_s(), RTO_S_MIN);
+        round_trip.bound(0.01);
+        assert_eq!(round_trip.timeout_s(), before);
+        round_trip.timed_out();
+        round_trip.bound(0.03);
+        assert!((before..2.0 * before).contains(&round_trip.timeout_s()));
+    }
+
+    #[test]
+    fn a_line_slower_than_its_time_out_is_found_to_be_so() {
+        // Every block is sent again until its answer comes after 0.1 s; soon none needs to be.
+        let mut round_trip = RoundTrip::new();
+        round_trip.sample(0.003);
+        let mut resent = [0; 100];
+        for resent in &mut resent {
+            let (mut sent_s, mut times) = (0.0, 0_u32);
+            while sent_s + round_trip.timeout_s() < 0.1 {
+                sent_s += round_trip.timeout_s();
+                round_trip.timed_out();
+                times += 1;
+            }
+            if times == 0 {
+                round_trip.sample(0.1)
+            } else {
+                round_trip.bound(0.1 - sent_s)
+            }
+            *resent = times;
+        }
+        assert_eq!(resent[50..], [0; 50], "{resent:?}");
     }
 
     #[test]

@@ -2,8 +2,14 @@
 //!
 //! The board takes blocks in order only. Every block it sends carries the sequence number it expects next; an empty
 //! one is an acknowledgement, and one that repeats the last number says that something else arrived than what was
-//! expected. So a loss is repaired by sending again everything that is unacknowledged. Knows nothing of what is in
-//! the blocks but the motion clocks that it is given.
+//! expected. So a loss is repaired by sending again everything that is unacknowledged.
+//!
+//! Every transmission gets one answer, in order. Those that were on the way behind a lost block all repeat its
+//! number, and so do the answers to what was sent again in vain: taken for new losses, each would cause more of the
+//! same. So transmissions and answers are counted against each other, and a repeated number is a loss only when it
+//! answers the last transmission of the block in question, or a later one.
+//!
+//! Knows nothing of what is in the blocks but the motion clocks that it is given.
 
 use std::collections::VecDeque;
 
@@ -14,6 +20,9 @@ use super::{
     MOTION_LANES_MAX,
     rtt::{Loss, RoundTrip},
 };
+
+/// How many of the last transmissions are remembered, to tell which one an answer belongs to.
+const TRANSMISSIONS_REMEMBERED: usize = 64;
 
 /// The board sends four bits of a sequence number that the host counts in full.
 const SEQUENCES: u64 = SEQUENCE_MASK as u64 + 1;
@@ -41,6 +50,23 @@ struct Sent {
     motion: MotionClocks,
 }
 
+/// The latest transmission of a sequence number.
+#[derive(Clone, Copy, Debug, Default)]
+struct Transmission {
+    /// When, where there was only one.
+    sent_s: Option<f64>,
+    /// Its place among all transmissions.
+    place: u64,
+}
+
+/// Something was sent again.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Resent {
+    pub(super) bytes: usize,
+    /// No answer came in time; otherwise the board asked for it.
+    pub(super) timed_out: bool,
+}
+
 /// What a frame from the board means for the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Verdict {
@@ -57,20 +83,32 @@ pub(super) struct Window {
     adopted: bool,
     probes: u32,
     probe_s: f64,
+    /// The number that the board gave last, and when, while it is not settled yet.
+    candidate: Option<(u8, f64)>,
+    /// How often it gave one.
+    candidates: u32,
     /// The number that the board expects, in full: that of the front of `sent`.
     expected: u64,
     sent: VecDeque<Sent>,
     sent_bytes: usize,
-    /// The number in the last empty block.
+    /// The number in the last empty block, and when that came.
     last_answer: u64,
+    last_answer_s: f64,
     /// Blocks below this number have been sent again; the board may have had some of them already.
     resent_below: u64,
-    /// Repeated answers that are explained by such blocks.
-    forgiven: u64,
+    /// Transmissions so far.
+    transmissions: u64,
+    /// The place of the transmission that the next answer belongs to.
+    unanswered: u64,
+    /// The board asked for the front again.
     send_again: bool,
+    /// The board asked for the front, but perhaps before it was sent for the last time.
+    suspect: bool,
     last_progress_s: f64,
-    /// When the block of a number modulo 16 was sent, where it was sent once.
-    sent_at: [Option<f64>; SEQUENCES as usize],
+    /// By sequence number modulo 16.
+    latest: [Transmission; SEQUENCES as usize],
+    /// The sequence numbers of the last transmissions, by place.
+    log: [u64; TRANSMISSIONS_REMEMBERED],
     motion_ends: [Ticks; MOTION_LANES_MAX],
     pub(super) round_trip: RoundTrip,
     pub(super) loss: Loss,
@@ -82,15 +120,21 @@ impl Window {
             adopted: false,
             probes: 0,
             probe_s: 0.0,
+            candidate: None,
+            candidates: 0,
             expected: 0,
             sent: VecDeque::with_capacity(SEQUENCES as usize),
             sent_bytes: 0,
             last_answer: 0,
+            last_answer_s: 0.0,
             resent_below: 0,
-            forgiven: 0,
+            transmissions: 0,
+            unanswered: 0,
             send_again: false,
+            suspect: false,
             last_progress_s: 0.0,
-            sent_at: [None; SEQUENCES as usize],
+            latest: [Transmission::default(); SEQUENCES as usize],
+            log: [0; TRANSMISSIONS_REMEMBERED],
             motion_ends: [Ticks(0); MOTION_LANES_MAX],
             round_trip: RoundTrip::new(),
             loss: Loss::new(),
@@ -139,9 +183,18 @@ impl Window {
         1 + block.as_bytes().len()
     }
 
-    /// When to probe, if the number is not known.
+    /// When the number is settled, or else when to ask (again).
+    ///
+    /// A probe may be answered twice, by a refusal of noise before it and by its own acknowledgement with another
+    /// number, and late answers to earlier probes may follow. The last one counts.
     pub(super) fn probe_due_s(&self) -> f64 {
-        if self.probes == 0 { f64::NEG_INFINITY } else { self.probe_s + self.round_trip.timeout_s() }
+        const QUIET_S_MIN: f64 = 0.01;
+        const QUIET_S_MAX: f64 = 0.25;
+        match self.candidate {
+            Some((_, at_s)) => at_s + (at_s - self.probe_s).clamp(QUIET_S_MIN, QUIET_S_MAX),
+            None if self.probes == 0 => f64::NEG_INFINITY,
+            None => self.probe_s + self.round_trip.timeout_s(),
+        }
     }
 
     /// Frames and sends a payload. Returns its length.
@@ -156,7 +209,7 @@ impl Window {
         let block = Block::new(sequence as u8, payload);
         let len = block.as_bytes().len();
         out.extend_from_slice(block.as_bytes());
-        self.sent_at[(sequence % SEQUENCES) as usize] = Some(now_s);
+        self.transmitted(sequence, Some(now_s));
         if self.sent.is_empty() {
             self.last_progress_s = now_s;
         }
@@ -171,37 +224,57 @@ impl Window {
         if self.send_again {
             return Some(f64::NEG_INFINITY);
         }
-        Some(front.last_s.max(self.last_progress_s) + self.round_trip.timeout_s())
+        let timeout_s = front.last_s.max(self.last_progress_s) + self.round_trip.timeout_s();
+        let silence_s = self.last_answer_s + 0.5 * self.round_trip.answer_s_max();
+        let suspicion_s = silence_s.max(front.last_s + self.round_trip.answer_s_max());
+        Some(if self.suspect { timeout_s.min(suspicion_s) } else { timeout_s })
     }
 
-    /// Sends everything unacknowledged again where that is due. Returns how many bytes that was.
-    pub(super) fn resend(&mut self, now_s: f64, out: &mut Vec<u8>) -> usize {
+    /// Sends everything unacknowledged again where that is due.
+    pub(super) fn resend(&mut self, now_s: f64, out: &mut Vec<u8>) -> Option<Resent> {
         if self.resend_due_s().is_none_or(|due| now_s < due) {
-            return 0;
+            return None;
+        }
+        let timed_out = !self.send_again && !self.suspect;
+        if timed_out {
+            self.round_trip.timed_out();
         }
         if !self.send_again {
-            self.round_trip.timed_out();
+            // Whatever has not been answered by now will not be.
+            self.unanswered = self.transmissions;
         }
         self.loss.lost();
         self.send_again = false;
+        self.suspect = false;
         let before = out.len();
         out.push(SYNC);
-        for (sequence, sent) in (self.expected..).zip(&mut self.sent) {
+        for at in 0..self.sent.len() {
+            let sent = &mut self.sent[at];
             out.extend_from_slice(sent.block.as_bytes());
             sent.last_s = now_s;
             sent.transmissions = sent.transmissions.saturating_add(1);
-            self.sent_at[(sequence % SEQUENCES) as usize] = None;
+            self.transmitted(self.expected + at as u64, None);
         }
         self.resent_below = self.expected + self.sent.len() as u64;
-        self.forgiven = 0;
-        out.len() - before
+        Some(Resent { bytes: out.len() - before, timed_out })
+    }
+
+    fn transmitted(&mut self, sequence: u64, sent_s: Option<f64>) {
+        self.latest[(sequence % SEQUENCES) as usize] = Transmission { sent_s, place: self.transmissions };
+        self.log[self.transmissions as usize % TRANSMISSIONS_REMEMBERED] = sequence;
+        self.transmissions += 1;
+    }
+
+    fn latest(&self, sequence: u64) -> Transmission {
+        self.latest[(sequence % SEQUENCES) as usize]
     }
 
     /// Takes the number of a valid block from the board.
     pub(super) fn answer(&mut self, sequence: u8, empty: bool, now_s: f64) -> Verdict {
         if !self.adopted {
             if empty && self.probes > 0 {
-                self.adopt(sequence, now_s);
+                self.candidate = Some((sequence, now_s));
+                self.candidates = self.candidates.saturating_add(1);
             }
             return Verdict::default();
         }
@@ -216,19 +289,23 @@ impl Window {
         if empty {
             self.judge(number, now_s);
         }
-        let answered = number.wrapping_sub(1) % SEQUENCES;
-        Verdict { sent_s: self.sent_at[answered as usize], absurd: false }
+        Verdict { sent_s: self.latest(number - 1).sent_s, absurd: false }
     }
 
-    fn adopt(&mut self, sequence: u8, now_s: f64) {
-        if self.probes == 1 {
-            self.round_trip.sample(now_s - self.probe_s);
+    /// Takes the number that the board gave, if it is settled.
+    pub(super) fn adopt(&mut self, now_s: f64) -> bool {
+        let Some((sequence, at_s)) = self.candidate.filter(|_| now_s >= self.probe_due_s()) else {
+            return false;
+        };
+        if self.probes == 1 && self.candidates == 1 {
+            self.round_trip.sample(at_s - self.probe_s);
         }
         self.adopted = true;
         // Numbers start a whole turn above zero, so that there is always one before.
         self.expected = SEQUENCES + u64::from(sequence);
         self.last_answer = self.expected;
         self.resent_below = self.expected;
+        true
     }
 
     fn acknowledge(&mut self, count: usize, now_s: f64) {
@@ -237,35 +314,56 @@ impl Window {
             for (end, lane) in self.motion_ends.iter_mut().zip(sent.motion.ends) {
                 *end = (*end).max(lane);
             }
-            if sent.transmissions == 1 && at + 1 == count {
-                // The last one is what caused this answer; those before it lost theirs.
+            // The last one is what caused this answer; those before it lost theirs.
+            if at + 1 < count {
+                continue;
+            }
+            if sent.transmissions == 1 {
                 self.round_trip.sample(now_s - sent.first_s);
+            } else {
+                self.round_trip.bound(now_s - sent.last_s);
             }
         }
         self.expected += count as u64;
         self.last_progress_s = now_s;
         self.send_again = false;
-        self.round_trip.progress(count as u32);
+        self.suspect = false;
         self.loss.arrived(count as u32);
     }
 
-    /// Tells a nak from an acknowledgement.
+    /// Tells a refusal from an acknowledgement.
     fn judge(&mut self, number: u64, now_s: f64) {
-        let jump = number.saturating_sub(self.last_answer);
-        if jump > 0 {
-            // A board that had already taken some of what was sent again answers each of those with this number.
-            self.forgiven = if number <= self.resent_below { jump - 1 } else { 0 };
+        self.last_answer_s = now_s;
+        if number > self.last_answer {
+            // A board that already had some of what was sent again answers the first of it with a number far ahead,
+            // and so does one whose answers were lost on the way; the former leaves more answers to come.
+            let answered = if number <= self.resent_below { self.last_answer } else { number - 1 };
+            self.unanswered = self.place_of(answered) + 1;
             self.last_answer = number;
             return;
         }
         let Some(front) = self.sent.front() else { return };
-        if self.forgiven > 0 {
-            self.forgiven -= 1;
-            return;
-        }
-        // An answer that comes too soon was caused by a block sent before the last transmission of this one.
-        if now_s - front.last_s >= self.round_trip.answer_s_min() {
+        let place = self.unanswered;
+        self.unanswered = (place + 1).min(self.transmissions);
+        let age_s = now_s - front.last_s;
+        let answers_front =
+            place >= self.latest(self.expected).place && age_s >= self.round_trip.answer_s_min();
+        if answers_front {
             self.send_again = true;
+        } else {
+            self.suspect = true;
         }
+    }
+
+    /// The place of the transmission of a block that an answer to it most likely belongs to: the one that is nearest
+    /// to where the count of answers stands. Noise makes the board answer too often, and answers get lost; this
+    /// brings the count back into step.
+    fn place_of(&self, sequence: u64) -> u64 {
+        let remembered =
+            self.transmissions.saturating_sub(TRANSMISSIONS_REMEMBERED as u64)..self.transmissions;
+        remembered
+            .filter(|&place| self.log[place as usize % TRANSMISSIONS_REMEMBERED] == sequence)
+            .min_by_key(|&place| place.abs_diff(self.unanswered))
+            .unwrap_or_else(|| self.latest(sequence).place)
     }
 }
