@@ -1,0 +1,210 @@
+//! The command line: what can be asked, and what it is called.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use virtual_printer::{BoardProfile, FAULT_ITEMS, Faults};
+
+/// Checks, plans and simulates G-code for a printer, and serves a virtual one.
+#[derive(Debug, Parser)]
+#[command(
+    name = "stepcast",
+    version,
+    arg_required_else_help = true,
+    after_help = "Exit status: 0 done, 1 the job failed (why is on stderr), 2 wrong usage."
+)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: CommandLine,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum CommandLine {
+    /// Read a G-code file and say by line what is wrong with it
+    Check(CheckArgs),
+    /// Plan a G-code file for a machine: print time, steps, bytes
+    Plan(PlanArgs),
+    /// Print a G-code file on the virtual printer, in virtual time, and measure what its pulses draw
+    Simulate(SimulateArgs),
+    /// Serve the virtual printer on a pseudo-terminal, in real time
+    VirtualPrinter(VirtualPrinterArgs),
+    /// Write a completion script for a shell to stdout
+    Completions {
+        /// Which shell
+        shell: clap_complete::Shell,
+    },
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct CheckArgs {
+    /// The G-code, plain or gzip
+    pub(crate) file: PathBuf,
+    /// The machine, so that its limits are checked too
+    #[arg(long, value_name = "PRINTER.CFG")]
+    pub(crate) config: Option<PathBuf>,
+    /// Write the result as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct PlanArgs {
+    /// The G-code, plain or gzip
+    pub(crate) file: PathBuf,
+    /// The machine
+    #[arg(long, value_name = "PRINTER.CFG")]
+    pub(crate) config: PathBuf,
+    /// Write the result as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write the blocks that would be sent to a board into this file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) dump_stream: Option<PathBuf>,
+}
+
+/// The board that is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Board {
+    /// Raspberry Pi RP2040 on USB
+    Rp2040,
+    /// STM32F103 on a UART, with little memory
+    Stm32f103,
+}
+
+impl Board {
+    /// The board's clock, pins, memory and link.
+    pub(crate) fn profile(self) -> BoardProfile {
+        match self {
+            Self::Rp2040 => BoardProfile::rp2040(),
+            Self::Stm32f103 => BoardProfile::stm32f103(),
+        }
+    }
+}
+
+/// What the simulated machine is like.
+#[derive(Args, Debug)]
+pub(crate) struct MachineArgs {
+    /// The board; when left out, the one whose pins the machine file names
+    #[arg(long, value_enum)]
+    pub(crate) board: Option<Board>,
+    /// What all chance follows from: the same seed gives the same run
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    #[doc = "Something that goes wrong; may be given several times"]
+    #[arg(long = "fault", value_name = "FAULT", long_help = fault_help())]
+    pub(crate) faults: Vec<Faults>,
+}
+
+impl MachineArgs {
+    /// All faults in one script.
+    pub(crate) fn faults(&self) -> Faults {
+        let mut all = Faults::default();
+        for faults in &self.faults {
+            all += faults.clone();
+        }
+        all
+    }
+}
+
+fn fault_help() -> String {
+    format!("Something that goes wrong; may be given several times. Known faults: {FAULT_ITEMS}")
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct SimulateArgs {
+    /// The G-code, plain or gzip
+    pub(crate) file: PathBuf,
+    /// The machine
+    #[arg(long, value_name = "PRINTER.CFG")]
+    pub(crate) config: PathBuf,
+    /// Write the result as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) machine: MachineArgs,
+    /// Print although this line has a command that is not known; may be given several times
+    #[arg(long = "confirm-line", value_name = "LINE")]
+    pub(crate) confirm_lines: Vec<u32>,
+    /// Print although lines have commands that are not known
+    #[arg(long)]
+    pub(crate) confirm_all: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct VirtualPrinterArgs {
+    /// Where the terminal appears: a symbolic link, removed at the end
+    #[arg(long, value_name = "PATH")]
+    pub(crate) pty: PathBuf,
+    /// How much faster than real time its clock runs
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = speed)]
+    pub(crate) speed: f64,
+    /// The machine; a usual one when left out
+    #[arg(long, value_name = "PRINTER.CFG")]
+    pub(crate) config: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) machine: MachineArgs,
+}
+
+/// The slowest and fastest clock of a virtual printer that is served in real time.
+const SPEED_RANGE: std::ops::RangeInclusive<f64> = 0.01..=200.0;
+
+fn speed(text: &str) -> Result<f64, String> {
+    let (min, max) = (SPEED_RANGE.start(), SPEED_RANGE.end());
+    match text.parse::<f64>() {
+        Ok(factor) if SPEED_RANGE.contains(&factor) => Ok(factor),
+        _ => Err(format!("a number from {min} to {max} is needed")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn faults_add_up() {
+        let cli = Cli::try_parse_from([
+            "stepcast",
+            "simulate",
+            "a.gcode",
+            "--config",
+            "p.cfg",
+            "--fault",
+            "corrupt=0.01",
+            "--fault",
+            "unplug@30",
+            "--board",
+            "stm32f103",
+            "--confirm-line",
+            "3",
+            "--confirm-line",
+            "4",
+        ])
+        .unwrap();
+        let CommandLine::Simulate(args) = cli.command else { panic!("another command") };
+        let faults = args.machine.faults();
+        assert_eq!(faults.bytes.corrupt, 0.01);
+        assert_eq!(faults.failures.len(), 1);
+        assert_eq!(args.machine.board.unwrap().profile().name, "stm32f103");
+        assert_eq!(args.confirm_lines, [3, 4]);
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        for arguments in [
+            &["stepcast", "simulate", "a", "--config", "p", "--fault", "meteor"][..],
+            &["stepcast", "simulate", "a"],
+            &["stepcast", "virtual-printer", "--pty", "p", "--speed", "0"],
+            &["stepcast", "virtual-printer", "--pty", "p", "--speed", "nan"],
+            &["stepcast", "plan", "a", "--config", "p", "--board", "avr"],
+            &["stepcast"],
+        ] {
+            assert!(Cli::try_parse_from(arguments).is_err(), "{arguments:?}");
+        }
+    }
+}

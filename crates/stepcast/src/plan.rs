@@ -1,0 +1,174 @@
+//! `stepcast plan`: what a file takes on a machine.
+
+use std::{
+    collections::BTreeMap,
+    fmt::Write as _,
+    fs::File,
+    io::{BufWriter, Write as _},
+    path::Path,
+    process::ExitCode,
+};
+
+use anyhow::Context;
+use printer::{
+    machine::MOTOR_NAMES,
+    planner::{PlanReport, PlanStream},
+};
+use serde::Serialize;
+
+use crate::{
+    cli::PlanArgs,
+    config_file,
+    console::{self, Progress},
+    input::Input,
+};
+
+/// The result as JSON; the keys are stable.
+#[derive(Debug, Serialize)]
+struct Report {
+    print_time_s: f64,
+    moves: u64,
+    motors: BTreeMap<&'static str, Motor>,
+    bytes: u64,
+    bytes_per_step: f64,
+    max_step_error_us: f64,
+    filament_mm: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Motor {
+    steps: u64,
+    queue_steps: u64,
+    peak_steps_per_s: f64,
+}
+
+impl From<&PlanReport> for Report {
+    fn from(plan: &PlanReport) -> Self {
+        let motors = MOTOR_NAMES.iter().zip(&plan.motors).map(|(&name, motor)| {
+            let &printer::planner::MotorReport { steps, queue_steps, peak_steps_per_s } = motor;
+            (name, Motor { steps, queue_steps, peak_steps_per_s })
+        });
+        let steps: u64 = plan.motors.iter().map(|motor| motor.steps).sum();
+        Self {
+            print_time_s: plan.print_time.0,
+            moves: plan.moves,
+            motors: motors.collect(),
+            bytes: plan.bytes,
+            bytes_per_step: if steps == 0 { 0.0 } else { plan.bytes as f64 / steps as f64 },
+            max_step_error_us: plan.step_error_max.0 * 1e6,
+            filament_mm: plan.filament_mm,
+        }
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
+    let config = config_file::load(&args.config)?;
+    let mut input = Input::open(&args.file)?;
+    let mut dump = args.dump_stream.as_deref().map(Dump::create).transpose()?;
+    let progress = Progress::new("planning", input.size());
+    let mut stream = PlanStream::new(&config)?;
+    let mut blocks = Vec::new();
+    loop {
+        let chunk = input.next(stream.wants())?;
+        if chunk.is_empty() {
+            break;
+        }
+        stream.feed(chunk, &mut blocks, |_| {})?;
+        flush(&mut dump, &mut blocks)?;
+        progress.set(input.position());
+    }
+    let plan = stream.finish(&mut blocks, |_| {})?;
+    flush(&mut dump, &mut blocks)?;
+    if let Some(dump) = dump {
+        dump.finish()?;
+    }
+    drop(progress);
+    let report = Report::from(&plan);
+    if args.json {
+        console::print_json(&report)?;
+    } else {
+        console::print(&text(&report));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The stream of blocks as a file.
+struct Dump<'a> {
+    path: &'a Path,
+    file: BufWriter<File>,
+}
+
+impl<'a> Dump<'a> {
+    fn create(path: &'a Path) -> anyhow::Result<Self> {
+        let file = File::create(path).with_context(|| format!("cannot create {}", path.display()))?;
+        Ok(Self { path, file: BufWriter::new(file) })
+    }
+
+    fn finish(mut self) -> anyhow::Result<()> {
+        self.file.flush().with_context(|| format!("cannot write {}", self.path.display()))
+    }
+}
+
+fn flush(dump: &mut Option<Dump<'_>>, blocks: &mut Vec<u8>) -> anyhow::Result<()> {
+    if let Some(dump) = dump {
+        dump.file.write_all(blocks).with_context(|| format!("cannot write {}", dump.path.display()))?;
+    }
+    blocks.clear();
+    Ok(())
+}
+
+fn text(report: &Report) -> String {
+    let mut text = String::new();
+    let time = console::duration_text(report.print_time_s);
+    let _ = writeln!(text, "Print time   {time} ({:.2} s)", report.print_time_s);
+    let _ = writeln!(text, "Filament     {:.1} mm", report.filament_mm);
+    let _ = writeln!(text, "Moves        {}", report.moves);
+    let _ = writeln!(text, "Motor              steps  queue_steps    peak steps/s");
+    for name in MOTOR_NAMES {
+        if let Some(motor) = report.motors.get(name) {
+            let Motor { steps, queue_steps, peak_steps_per_s } = motor;
+            let _ = writeln!(text, "  {name:<10} {steps:>11} {queue_steps:>12} {peak_steps_per_s:>15.0}");
+        }
+    }
+    let _ = writeln!(text, "Stream       {} bytes, {:.3} bytes a step", report.bytes, report.bytes_per_step);
+    let _ = writeln!(text, "Step times   at most {:.2} µs off", report.max_step_error_us);
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use printer::planner::MotorReport;
+    use units::Seconds;
+
+    #[test]
+    fn the_json_has_the_keys_that_are_documented() {
+        let mut plan = PlanReport { print_time: Seconds(12.5), bytes: 300, ..PlanReport::default() };
+        plan.motors[1] = MotorReport { steps: 1000, queue_steps: 10, peak_steps_per_s: 2e4 };
+        plan.step_error_max = Seconds(25e-6);
+        let report = Report::from(&plan);
+        let json = serde_json::to_value(&report).unwrap();
+        let keys: Vec<_> = json.as_object().unwrap().keys().map(String::as_str).collect();
+        let mut wanted = [
+            "print_time_s",
+            "moves",
+            "motors",
+            "bytes",
+            "bytes_per_step",
+            "max_step_error_us",
+            "filament_mm",
+        ];
+        wanted.sort_unstable();
+        assert_eq!(keys, wanted);
+        assert_eq!(json["motors"]["stepper_y"]["queue_steps"], 10);
+        assert_eq!(json["bytes_per_step"], 0.3);
+        assert!((json["max_step_error_us"].as_f64().unwrap() - 25.0).abs() < 1e-9);
+        assert!(text(&report).contains("stepper_y         1000"), "{}", text(&report));
+    }
+
+    #[test]
+    fn a_plan_without_steps_divides_by_nothing() {
+        assert_eq!(Report::from(&PlanReport::default()).bytes_per_step, 0.0);
+    }
+}

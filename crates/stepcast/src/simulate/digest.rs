@@ -1,0 +1,178 @@
+//! A fingerprint of every edge on the motors' pins.
+//!
+//! An edge counts with its motor, its kind and its distance in ticks from the first step of its run of motion. Two
+//! prints with the same fingerprint made the same pulses, however late the board got its orders and wherever on its clock
+//! the runs began. Homing is left out: there a switch decides when a run ends.
+//!
+//! Not a cryptographic hash: it tells accidents apart, not adversaries.
+
+use std::collections::VecDeque;
+
+use printer::machine::MOTORS;
+use units::Ticks;
+
+/// The most runs that may be announced and not yet begun.
+const RUNS_AHEAD_MAX: usize = 4096;
+
+/// An odd number without structure (the golden ratio's digits).
+const MULTIPLIER: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// What an edge is.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    StepForward = 1,
+    StepBackward = 2,
+    StepEnd = 3,
+    Forward = 4,
+    Backward = 5,
+    Run = 6,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Motor {
+    hash: u64,
+    /// A change of direction belongs to the run of the step that follows it.
+    direction: Option<(Ticks, bool)>,
+    /// The last step belongs to a run that counts.
+    in_run: bool,
+}
+
+/// The fingerprint of the edges so far.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Digest {
+    motors: [Motor; MOTORS],
+    /// Runs that have not begun: from when on, and whether they home.
+    ahead: VecDeque<(Ticks, bool)>,
+    /// Where the present run's first step was; `None` while homing and before any run.
+    base: Option<u64>,
+    runs: u64,
+}
+
+impl Digest {
+    /// A run of motion begins at this clock or, with its first step, somewhat later.
+    pub(crate) fn expect_run(&mut self, at: Ticks, homing: bool) {
+        if self.ahead.len() < RUNS_AHEAD_MAX {
+            self.ahead.push_back((at, homing));
+        }
+    }
+
+    /// A pulse began.
+    #[inline]
+    pub(crate) fn step(&mut self, motor: usize, at: Ticks, forward: bool) {
+        if !self.ahead.is_empty() {
+            self.begin_runs(at);
+        }
+        let Some(state) = self.motors.get_mut(motor) else { return };
+        let direction = state.direction.take();
+        state.in_run = self.base.is_some();
+        let Some(base) = self.base else { return };
+        if let Some((changed, forward)) = direction {
+            state.add(if forward { Kind::Forward } else { Kind::Backward }, changed.0.wrapping_sub(base));
+        }
+        state.add(if forward { Kind::StepForward } else { Kind::StepBackward }, at.0.wrapping_sub(base));
+    }
+
+    /// A pulse ended.
+    #[inline]
+    pub(crate) fn step_end(&mut self, motor: usize, at: Ticks) {
+        if let (Some(state), Some(base)) = (self.motors.get_mut(motor), self.base)
+            && state.in_run
+        {
+            state.add(Kind::StepEnd, at.0.wrapping_sub(base));
+        }
+    }
+
+    /// The direction pin changed.
+    #[inline]
+    pub(crate) fn direction(&mut self, motor: usize, at: Ticks, forward: bool) {
+        if let Some(state) = self.motors.get_mut(motor) {
+            state.direction = Some((at, forward));
+        }
+    }
+
+    /// The fingerprint, as 16 hexadecimal digits.
+    pub(crate) fn text(&self) -> String {
+        let all = self.motors.iter().fold(self.runs, |hash, motor| mix(hash, motor.hash));
+        format!("{all:016x}")
+    }
+
+    #[cold]
+    fn begin_runs(&mut self, at: Ticks) {
+        while let Some((_, homing)) = self.ahead.pop_front_if(|(start, _)| *start <= at) {
+            if homing {
+                self.base = None;
+                continue;
+            }
+            self.base = Some(at.0);
+            self.runs += 1;
+            for motor in &mut self.motors {
+                motor.add(Kind::Run, self.runs);
+            }
+        }
+    }
+}
+
+impl Motor {
+    #[inline]
+    fn add(&mut self, kind: Kind, value: u64) {
+        self.hash = mix(self.hash, value << 3 | kind as u64);
+    }
+}
+
+#[inline]
+fn mix(hash: u64, value: u64) -> u64 {
+    let product = (hash.rotate_left(29) ^ value).wrapping_mul(MULTIPLIER);
+    product ^ product >> 32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two runs with a reversal, beginning at these clocks; `nudge` is added to one step.
+    fn digest(starts: [u64; 2], first_step: u64, nudge: u64) -> String {
+        let mut digest = Digest::default();
+        for start in starts {
+            digest.expect_run(Ticks(start), false);
+        }
+        for start in starts {
+            let base = start + first_step;
+            digest.step(0, Ticks(base), true);
+            digest.step_end(0, Ticks(base + 5));
+            digest.step(1, Ticks(base + 3), true);
+            digest.direction(0, Ticks(base + 50), false);
+            digest.step(0, Ticks(base + 100 + nudge), false);
+        }
+        digest.text()
+    }
+
+    #[test]
+    fn only_distances_from_the_first_step_count() {
+        let one = digest([1000, 5000], 7, 0);
+        assert_eq!(one, digest([90_000, 123_456], 19, 0));
+        assert_ne!(one, digest([1000, 5000], 7, 1));
+        assert_eq!(one.len(), 16);
+    }
+
+    #[test]
+    fn homing_does_not_count() {
+        let mut digest = Digest::default();
+        let empty = digest.text();
+        digest.expect_run(Ticks(10), true);
+        digest.step(0, Ticks(20), true);
+        digest.step_end(0, Ticks(25));
+        assert_eq!(digest.text(), empty);
+    }
+
+    #[test]
+    fn a_direction_that_changed_before_the_run_counts_with_it() {
+        let run = |changed: u64| {
+            let mut digest = Digest::default();
+            digest.direction(0, Ticks(changed), false);
+            digest.expect_run(Ticks(100), false);
+            digest.step(0, Ticks(110), false);
+            digest.text()
+        };
+        assert_ne!(run(50), run(60));
+    }
+}

@@ -1,0 +1,279 @@
+//! The path that a file asks for, read a second time and apart from the session that prints it.
+//!
+//! The session says which move it makes when; each of them must be the file's next move, from its first to its last. Knows
+//! G-code and nothing of pulses. Positions in mm, filament counted from the start of the file.
+
+use std::collections::VecDeque;
+
+use gcode::{Action, Arc, CHORD_TOLERANCE, Chords, Interpreter, Lines, Move, Settings};
+
+/// How far a move's end may be from the file's, in mm: the dust of arithmetic, far below a step.
+const SAME_PLACE_MM: f64 = 1e-6;
+/// X, Y, Z.
+const AXES: usize = 3;
+/// The most homed positions that wait for their line: one an axis, and an axis may be homed again.
+const HOMED_MAX: usize = 64;
+
+/// Where more of the file comes from.
+pub(crate) trait MoreGcode {
+    /// The next bytes; none at the end.
+    fn more(&mut self) -> anyhow::Result<&[u8]>;
+}
+
+impl MoreGcode for crate::input::Input {
+    fn more(&mut self) -> anyhow::Result<&[u8]> {
+        Ok(self.next_chunk()?)
+    }
+}
+
+/// A straight piece of the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Piece {
+    pub(crate) line: u32,
+    pub(crate) from: [f64; 4],
+    pub(crate) to: [f64; 4],
+    /// How far the true line, an arc, bulges from this straight one.
+    pub(crate) bulge_mm: f64,
+}
+
+impl Piece {
+    fn new(mv: &Move, bulge_mm: f64) -> Self {
+        Self { line: mv.line.0, from: mv.from.to_array(), to: mv.to.to_array(), bulge_mm }
+    }
+
+    /// Whether it moves anything by more than dust.
+    fn has_length(&self) -> bool {
+        self.from.iter().zip(&self.to).any(|(from, to)| (from - to).abs() > SAME_PLACE_MM)
+    }
+}
+
+/// The moves of a file, in order.
+pub(crate) struct GcodePath<R> {
+    source: R,
+    lines: Lines,
+    interpreter: Interpreter,
+    actions: Vec<Action>,
+    next_action: usize,
+    /// The arc that is being flattened.
+    chords: Option<(Chords, Arc)>,
+    homed: VecDeque<(usize, f64)>,
+    fed_all: bool,
+    ended: bool,
+}
+
+impl<R: MoreGcode> GcodePath<R> {
+    /// The path of a file, for a machine that stands at 0 and understands it by these settings.
+    pub(crate) fn new(source: R, settings: Settings) -> Self {
+        Self {
+            source,
+            lines: Lines::new(),
+            interpreter: Interpreter::new(settings),
+            actions: Vec::new(),
+            next_action: 0,
+            chords: None,
+            homed: VecDeque::new(),
+            fed_all: false,
+            ended: false,
+        }
+    }
+
+    /// The printer found this axis' endstop and says that it is here.
+    pub(crate) fn homed(&mut self, axis: usize, position_mm: f64) {
+        if self.homed.len() == HOMED_MAX {
+            self.homed.pop_front();
+        }
+        self.homed.push_back((axis, position_mm));
+    }
+
+    /// Takes the file's next move, which must be this one.
+    pub(crate) fn take(&mut self, line: u32, from: [f64; 4], to: [f64; 4]) -> anyhow::Result<Piece> {
+        loop {
+            let Some(piece) = self.next()? else {
+                anyhow::bail!("the printer makes a move for line {line}, but the file has no more moves");
+            };
+            let filament = (piece.to[AXES] - piece.from[AXES]) - (to[AXES] - from[AXES]);
+            let same = piece.line == line
+                && (0..AXES).all(|axis| (piece.to[axis] - to[axis]).abs() <= SAME_PLACE_MM)
+                && filament.abs() <= SAME_PLACE_MM;
+            if same {
+                return Ok(piece);
+            }
+            if piece.has_length() {
+                anyhow::bail!(
+                    "line {} asks for a move to {}, the printer makes one to {} for line {line}",
+                    piece.line,
+                    place(piece.to),
+                    place(to)
+                );
+            }
+        }
+    }
+
+    /// Makes sure that no moves are left.
+    pub(crate) fn finish(&mut self) -> anyhow::Result<()> {
+        while let Some(piece) = self.next()? {
+            if piece.has_length() {
+                anyhow::bail!("the move to {} of line {} was never made", place(piece.to), piece.line);
+            }
+        }
+        Ok(())
+    }
+
+    fn next(&mut self) -> anyhow::Result<Option<Piece>> {
+        loop {
+            if let Some((chords, arc)) = &mut self.chords {
+                if let Some(chord) = chords.next() {
+                    return Ok(Some(Piece::new(&chord, sagitta(arc, &chord))));
+                }
+                self.chords = None;
+            }
+            if let Some(action) = self.actions.get_mut(self.next_action) {
+                self.next_action += 1;
+                match std::mem::replace(action, Action::WaitForMoves) {
+                    Action::Move(mv) => return Ok(Some(Piece::new(&mv, 0.0))),
+                    Action::Arc(arc) => self.chords = Some((arc.chords(CHORD_TOLERANCE), arc)),
+                    Action::Home { x, y, z } => self.home([x, y, z])?,
+                    Action::Cancel => self.ended = true,
+                    _ => {}
+                }
+                continue;
+            }
+            if self.ended || !self.read_line()? {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// Reads the next line into `actions`; `false` at the end.
+    fn read_line(&mut self) -> anyhow::Result<bool> {
+        self.actions.clear();
+        self.next_action = 0;
+        loop {
+            if let Some(line) = self.lines.next() {
+                // What is wrong with the file has been said by the check before.
+                self.interpreter.line(line.number, line.bytes, &mut self.actions, &mut Vec::new());
+                return Ok(true);
+            }
+            if self.fed_all {
+                self.ended = true;
+                return Ok(false);
+            }
+            let chunk = self.source.more()?;
+            if chunk.is_empty() {
+                self.fed_all = true;
+                self.lines.end();
+            } else {
+                self.lines.feed(chunk);
+            }
+        }
+    }
+
+    fn home(&mut self, axes: [bool; AXES]) -> anyhow::Result<()> {
+        let mut at = [None; AXES];
+        for axis in (0..AXES).filter(|&axis| axes[axis]) {
+            let Some(found) = self.homed.iter().position(|&(homed, _)| homed == axis) else {
+                anyhow::bail!("the file homes axis {}, but the printer did not", ["X", "Y", "Z"][axis]);
+            };
+            at[axis] = self.homed.remove(found).map(|(_, position_mm)| position_mm);
+        }
+        let [x, y, z] = at;
+        self.interpreter.set_axes(x, y, z);
+        Ok(())
+    }
+}
+
+/// How far an arc's chord is from the arc in its middle.
+fn sagitta(arc: &Arc, chord: &Move) -> f64 {
+    let [first, second, _] = arc.plane.axes();
+    let (from, to) = (chord.from.to_array(), chord.to.to_array());
+    let half = ((to[first] - from[first]) / 2.0).hypot((to[second] - from[second]) / 2.0);
+    let radius = arc.radii().into_iter().fold(0.0, f64::max);
+    if half >= radius { radius } else { radius - (radius * radius - half * half).sqrt() }
+}
+
+fn place([x, y, z, e]: [f64; 4]) -> String {
+    format!("X{x:.4} Y{y:.4} Z{z:.4} (filament {e:.4})")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Text(&'static [u8], usize);
+
+    impl MoreGcode for Text {
+        fn more(&mut self) -> anyhow::Result<&[u8]> {
+            // Pieces that end in the middle of lines.
+            let count = self.1.min(self.0.len());
+            let (now, later) = self.0.split_at(count);
+            self.0 = later;
+            Ok(now)
+        }
+    }
+
+    fn path(text: &'static str) -> GcodePath<Text> {
+        GcodePath::new(Text(text.as_bytes(), 7), Settings::default())
+    }
+
+    const FILE: &str = "G28\nG92 E0\nG1 X10 F600\nG1 X10\nM117 hello\nG1 X10 Y5 E0.5\n";
+
+    #[test]
+    fn the_files_own_moves_are_taken_one_after_another() {
+        let mut path = path(FILE);
+        for axis in 0..3 {
+            path.homed(axis, 0.0);
+        }
+        let first = path.take(3, [0.0; 4], [10.0, 0.0, 0.0, 0.0]).unwrap();
+        assert_eq!((first.line, first.to[0], first.bulge_mm), (3, 10.0, 0.0));
+        // Line 4 leads nowhere and is passed over. The filament counts by its difference.
+        path.take(6, [10.0, 0.0, 0.0, 100.0], [10.0, 5.0, 0.0, 100.5]).unwrap();
+        path.finish().unwrap();
+    }
+
+    #[test]
+    fn another_move_than_the_files_is_found_out() {
+        for (line, to) in [
+            (3, [10.1, 0.0, 0.0, 0.0]),
+            (3, [10.0, 0.0, 0.0, 0.1]),
+            (4, [10.0, 0.0, 0.0, 0.0]),
+            (6, [10.0, 5.0, 0.0, 0.5]),
+        ] {
+            let mut path = path(FILE);
+            for axis in 0..3 {
+                path.homed(axis, 0.0);
+            }
+            let error = path.take(line, [0.0; 4], to).unwrap_err().to_string();
+            assert!(error.starts_with("line 3 asks for a move to X10.0000"), "{error}");
+        }
+    }
+
+    #[test]
+    fn homing_that_never_was_and_moves_that_never_were_are_found_out() {
+        let error = path(FILE).take(3, [0.0; 4], [10.0, 0.0, 0.0, 0.0]).unwrap_err();
+        assert!(error.to_string().contains("homes axis X"), "{error}");
+        let mut left = path("G1 X5\nG1 X6\n");
+        left.take(1, [0.0; 4], [5.0, 0.0, 0.0, 0.0]).unwrap();
+        assert!(left.finish().unwrap_err().to_string().contains("line 2 was never made"));
+        let error = path("").take(1, [0.0; 4], [1.0, 0.0, 0.0, 0.0]).unwrap_err();
+        assert!(error.to_string().contains("no more moves"));
+    }
+
+    #[test]
+    fn homed_positions_count_as_the_printer_says() {
+        let mut path = path("G28 X\nG91\nG1 X1\n");
+        path.homed(0, 250.0);
+        assert_eq!(path.take(3, [250.0, 0.0, 0.0, 0.0], [251.0, 0.0, 0.0, 0.0]).unwrap().from[0], 250.0);
+    }
+
+    #[test]
+    fn arcs_come_as_chords_with_their_bulge() {
+        let mut path = path("G1 X10 F600\nG3 X-10 Y0 I-10 J0\n");
+        path.take(1, [0.0; 4], [10.0, 0.0, 0.0, 0.0]).unwrap();
+        let mut count = 0;
+        while let Some(piece) = path.next().unwrap() {
+            assert!(piece.bulge_mm > 0.0 && piece.bulge_mm <= CHORD_TOLERANCE.0 + 1e-9, "{piece:?}");
+            count += 1;
+        }
+        assert!(count > 30);
+    }
+}

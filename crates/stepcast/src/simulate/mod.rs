@@ -1,0 +1,160 @@
+//! `stepcast simulate`: a whole print on the virtual printer in virtual time, with its pulses counted and measured.
+//!
+//! The file is checked, as a user's would be before a print; then a session prints it on a simulated board, while the
+//! same file, read a second time, says what the pulses should draw.
+
+mod digest;
+mod gcode_path;
+mod observer;
+mod path_check;
+pub(crate) mod pins;
+mod report;
+mod run;
+mod tally;
+mod temperature;
+pub(crate) mod wiring;
+
+use std::{collections::BTreeSet, process::ExitCode};
+
+use gcode::Severity;
+use printer::{
+    check::CheckReport,
+    error::{ErrorCode, PrinterError},
+    session::JobOptions,
+};
+
+use self::{
+    report::{Outcome, Report},
+    run::Simulation,
+};
+use crate::{
+    check,
+    cli::SimulateArgs,
+    config_file,
+    console::{self, ErrorReport},
+};
+
+/// The most findings of the check that are shown one by one.
+const FINDINGS_SHOWN_MAX: usize = 20;
+
+/// Runs the command.
+pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
+    let config = config_file::load(&args.config)?;
+    let found = check::check(&args.file, Some(&config))?;
+    let options = JobOptions {
+        confirmed_lines: args.confirm_lines.iter().copied().collect::<BTreeSet<u32>>(),
+        confirm_all: args.confirm_all,
+    };
+    let mut simulation = Simulation::new(args, config, options.clone())?;
+    if let Some(refusal) = Refusal::of(&found, &options) {
+        refusal.show();
+        let mut report = simulation.into_report();
+        report.result = Outcome::Refused;
+        report.reason = Some(refusal.reason.what_happened());
+        report.error = Some((&refusal.reason).into());
+        report.blocking_lines = refusal.blocking.iter().map(|(line, _)| *line).collect();
+        return finish(args, &report);
+    }
+    simulation.run()?;
+    let report = simulation.into_report();
+    finish(args, &report)
+}
+
+fn finish(args: &SimulateArgs, report: &Report) -> anyhow::Result<ExitCode> {
+    if args.json {
+        console::print_json(report)?;
+    } else {
+        console::print(&report.text());
+    }
+    if let Some(error) = &report.error {
+        console::show_error(error);
+    }
+    Ok(if report.result == Outcome::Done { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Why a file is not printed.
+struct Refusal {
+    reason: PrinterError,
+    errors: Vec<PrinterError>,
+    blocking: Vec<(u32, String)>,
+}
+
+impl Refusal {
+    fn of(found: &CheckReport, options: &JobOptions) -> Option<Self> {
+        let confirmed = |line: u32| options.confirm_all || options.confirmed_lines.contains(&line);
+        let open = found.blocking.iter().filter(|blocking| !confirmed(blocking.line));
+        let blocking: Vec<_> = open.map(|blocking| (blocking.line, blocking.message.clone())).collect();
+        let reason = match (found.errors.first(), blocking.first()) {
+            (Some(error), _) => error.clone(),
+            (None, Some((line, message))) => {
+                // The reader did not mind that line: it is the check's own remark on the end of the file.
+                let end = !found
+                    .diagnostics
+                    .iter()
+                    .any(|remark| remark.line.0 == *line && remark.severity == Severity::Blocking);
+                let code =
+                    if end && found.dropped == 0 { ErrorCode::FileCutOff } else { ErrorCode::UnknownCommand };
+                PrinterError::new(code, message.trim_end_matches('.')).at_line(*line)
+            }
+            (None, None) => return None,
+        };
+        Some(Self { reason, errors: found.errors.clone(), blocking })
+    }
+
+    /// Names each of them on stderr.
+    fn show(&self) {
+        let errors = self.errors.iter().map(|error| format!("error: {error}"));
+        let blocking = self.blocking.iter().map(|(line, message)| {
+            format!("line {line} must be confirmed (--confirm-line {line}): {message}")
+        });
+        let count = self.errors.len() + self.blocking.len();
+        for text in errors.chain(blocking).take(FINDINGS_SHOWN_MAX) {
+            console::note(&text);
+        }
+        if count > FINDINGS_SHOWN_MAX {
+            console::note(&format!("and {} more; `stepcast check` lists them", count - FINDINGS_SHOWN_MAX));
+        }
+    }
+}
+
+/// An error of the simulation's own making, put as the catalogue does.
+fn own_error(detail: impl Into<String>) -> ErrorReport {
+    ErrorReport {
+        code: "wrong-pulses",
+        line: None,
+        what_happened: detail.into(),
+        what_is_safe: None,
+        what_to_do: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use printer::check::Checker;
+
+    fn found(gcode: &str) -> CheckReport {
+        let mut checker = Checker::new(None);
+        checker.feed(gcode.as_bytes());
+        checker.finish()
+    }
+
+    #[test]
+    fn unknown_commands_must_be_confirmed_line_by_line() {
+        let found = found("G28\nSTART_PRINT\nFOO\nG1 X5\n");
+        let refusal = Refusal::of(&found, &JobOptions::default()).unwrap();
+        assert_eq!(refusal.reason.line, Some(2));
+        assert_eq!(refusal.blocking.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [2, 3]);
+        let one = JobOptions { confirmed_lines: BTreeSet::from([2]), confirm_all: false };
+        assert_eq!(Refusal::of(&found, &one).unwrap().reason.line, Some(3));
+        let all = JobOptions { confirm_all: true, ..JobOptions::default() };
+        assert!(Refusal::of(&found, &all).is_none());
+    }
+
+    #[test]
+    fn errors_cannot_be_confirmed_away() {
+        let found = found("G28\nG1 X1e400\nG1 X5\n");
+        let all = JobOptions { confirm_all: true, ..JobOptions::default() };
+        assert_eq!(Refusal::of(&found, &all).unwrap().reason.line, Some(2));
+    }
+}

@@ -1,0 +1,257 @@
+//! What is made of a session's events while it prints on the virtual printer.
+//!
+//! Knows the session's side (what it says that it does) and the file's (what it should do); the pulses' side is
+//! [`Tally`]'s, which it tells what to expect.
+
+use gcode::Heater;
+use printer::{
+    config::PrinterConfig,
+    error::PrinterError,
+    machine::{EXTRUDER, MOTOR_NAMES, MOTORS},
+    session::{Event, PhaseName, ScheduledMove},
+};
+use units::{Seconds, Ticks};
+use virtual_printer::VirtualPrinter;
+
+use super::{
+    gcode_path::{GcodePath, Piece},
+    path_check::Span,
+    report::Homing,
+    tally::Tally,
+    temperature::TemperatureWatch,
+};
+use crate::{
+    console::{self, ErrorReport},
+    input::Input,
+};
+
+/// The most homings that are reported one by one.
+const HOMINGS_MAX: usize = 300;
+/// The most texts of the file's that are passed on.
+const MESSAGES_MAX: u32 = 100;
+
+/// What the events ask of the simulation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wish {
+    /// The printer is ready: start the job.
+    Start,
+    /// The job is paused, and nobody is there: go on.
+    Resume,
+    /// It is over.
+    End,
+}
+
+/// Follows a print.
+pub(super) struct Observer {
+    step_distance_mm: [f64; MOTORS],
+    endstop_mm: [f64; 3],
+    gcode: GcodePath<Input>,
+    /// Steps of all moves that were scheduled.
+    pub(super) planned: [u64; MOTORS],
+    pub(super) moves: u64,
+    pub(super) homing: Vec<Homing>,
+    pub(super) pauses: u32,
+    pub(super) nozzle: TemperatureWatch,
+    pub(super) min_queued: Option<Seconds>,
+    pub(super) print_time: Seconds,
+    pub(super) line: u32,
+    /// What the session says went wrong.
+    pub(super) error: Option<PrinterError>,
+    /// Where the session's moves are not the file's.
+    pub(super) mismatch: Option<String>,
+    /// The whole job was printed.
+    pub(super) done: bool,
+    /// A run that has begun and not yet had its first move.
+    new_run: Option<Ticks>,
+    /// Where the present run began, unless it homes.
+    run_start: Option<Ticks>,
+    /// When anything happened last.
+    pub(super) last_change: Ticks,
+    messages: u32,
+}
+
+impl Observer {
+    /// Nothing has happened yet. `reference` is the file, opened a second time.
+    pub(super) fn new(config: &PrinterConfig, reference: Input, start: Ticks) -> Self {
+        Self {
+            step_distance_mm: printer::machine::step_distances(config).map(|distance| distance.0),
+            endstop_mm: config.steppers.each_ref().map(|axis| axis.position_endstop.0),
+            gcode: GcodePath::new(reference, printer::machine::gcode_settings(config)),
+            planned: [0; MOTORS],
+            moves: 0,
+            homing: Vec::new(),
+            pauses: 0,
+            nozzle: TemperatureWatch::default(),
+            min_queued: None,
+            print_time: Seconds::ZERO,
+            line: 0,
+            error: None,
+            mismatch: None,
+            done: false,
+            new_run: None,
+            run_start: None,
+            last_change: start,
+            messages: 0,
+        }
+    }
+
+    /// Takes in what happened.
+    pub(super) fn take(&mut self, event: Event, printer: &mut VirtualPrinter<Tally>) -> Option<Wish> {
+        if !matches!(event, Event::Temperature { .. }) {
+            self.last_change = printer.now();
+        }
+        match event {
+            Event::Phase(PhaseName::Ready) => return Some(Wish::Start),
+            Event::Phase(PhaseName::Failed | PhaseName::Shutdown) | Event::JobCancelled => {
+                return Some(Wish::End);
+            }
+            Event::RunStarted { at, .. } => self.new_run = Some(at),
+            Event::Move(scheduled) => self.take_move(&scheduled, printer),
+            Event::RunEnded { at } => {
+                if let Some(start) = self.run_start.take() {
+                    self.print_time += printer.profile().clock.duration_of(at.saturating_sub(start));
+                }
+            }
+            Event::Homed { axis, position_mm, steps } => self.take_homed(axis, position_mm, steps, printer),
+            Event::Temperature { heater: Heater::Tool(0), target, .. } => {
+                let state = printer.state();
+                let nozzle = state.heaters.iter().find(|heater| heater.name == MOTOR_NAMES[EXTRUDER]);
+                if let Some(nozzle) = nozzle {
+                    self.nozzle.set_target(target, nozzle.temperature);
+                }
+            }
+            Event::Progress { line, .. } => self.line = line,
+            Event::Message(text) => {
+                self.messages += 1;
+                if self.messages <= MESSAGES_MAX {
+                    console::note(&format!("printer: {text}"));
+                }
+            }
+            Event::Paused => {
+                self.pauses += 1;
+                return Some(Wish::Resume);
+            }
+            Event::JobDone => {
+                self.done = true;
+                return Some(Wish::End);
+            }
+            Event::Error(error) => {
+                self.error.get_or_insert(error);
+                return Some(Wish::End);
+            }
+            Event::Dropped(count) => {
+                self.mismatch.get_or_insert(format!("{count} events of the session were lost"));
+            }
+            Event::Identified { .. }
+            | Event::Phase(_)
+            | Event::Temperature { .. }
+            | Event::Annotation(_)
+            | Event::Object(_)
+            | Event::Notice(_)
+            | Event::Resumed => {}
+        }
+        None
+    }
+
+    fn take_move(&mut self, scheduled: &ScheduledMove, printer: &mut VirtualPrinter<Tally>) {
+        let &ScheduledMove { line, start, end, from, to, homing } = scheduled;
+        let tally = printer.recorder_mut();
+        if let Some(at) = self.new_run.take() {
+            tally.digest.expect_run(at, homing);
+            self.run_start = (!homing).then_some(at);
+        }
+        self.plan_steps(scheduled);
+        let mut piece = Piece { line, from, to, bulge_mm: 0.0 };
+        if !homing {
+            self.moves += 1;
+            if line > 0 && self.mismatch.is_none() {
+                match self.gcode.take(line, from, to) {
+                    Ok(found) => {
+                        piece.from[..EXTRUDER].copy_from_slice(&found.from[..EXTRUDER]);
+                        piece.to[..EXTRUDER].copy_from_slice(&found.to[..EXTRUDER]);
+                        piece.bulge_mm = found.bulge_mm;
+                    }
+                    Err(error) => self.mismatch = Some(format!("{error:#}")),
+                }
+            }
+        }
+        let span =
+            Span { line, start, end, from: piece.from, to: piece.to, bulge_mm: piece.bulge_mm, homing };
+        if tally.path.expect(&span).is_err() {
+            self.mismatch
+                .get_or_insert_with(|| format!("line {line} was planned too far ahead to be followed"));
+        }
+    }
+
+    /// Counts the steps of a move: those where it crosses half-way between two positions of a motor. An approach to an
+    /// endstop counts by what was made of it, which comes with [`Event::Homed`].
+    fn plan_steps(&mut self, scheduled: &ScheduledMove) {
+        for motor in 0..MOTORS {
+            let (from, to) = (scheduled.from[motor], scheduled.to[motor]);
+            let approach = scheduled.homing
+                && self.endstop_mm.get(motor).is_some_and(|&endstop| to == endstop && from != endstop);
+            if !approach {
+                let distance = self.step_distance_mm[motor];
+                self.planned[motor] += grid(to, distance).abs_diff(grid(from, distance));
+            }
+        }
+    }
+
+    fn take_homed(&mut self, axis: usize, position_mm: f64, steps: u64, printer: &mut VirtualPrinter<Tally>) {
+        let state = printer.state();
+        printer.recorder_mut().path.set_position(axis, position_mm);
+        self.gcode.homed(axis, position_mm);
+        self.planned[axis] += steps;
+        if self.homing.len() < HOMINGS_MAX {
+            self.homing.push(Homing {
+                motor: MOTOR_NAMES[axis],
+                position_mm,
+                error_mm: state.motors[axis].position.0 - position_mm,
+                steps,
+            });
+        }
+    }
+
+    /// How much motion the board has ahead of it, while a run is being made and more of it is to come.
+    pub(super) fn queued(&mut self, ahead: Option<Seconds>) {
+        if let Some(ahead) = ahead {
+            self.min_queued = Some(self.min_queued.map_or(ahead, |least| least.min(ahead)));
+        }
+    }
+
+    /// All moves have been made: the file must have none left.
+    pub(super) fn finish(&mut self) {
+        if self.done
+            && self.mismatch.is_none()
+            && let Err(error) = self.gcode.finish()
+        {
+            self.mismatch = Some(format!("the print stopped early: {error:#}"));
+        }
+    }
+
+    /// Why the job failed, as far as the session knows.
+    pub(super) fn session_error(&self) -> Option<ErrorReport> {
+        if let Some(error) = &self.error {
+            return Some(error.into());
+        }
+        (!self.done).then(|| super::own_error("the job was cancelled before its end"))
+    }
+}
+
+/// The number of the motor position nearest to a place; one exactly half-way belongs to the upper one.
+fn grid(position_mm: f64, step_distance_mm: f64) -> i64 {
+    (position_mm / step_distance_mm + 0.5).floor() as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_way_belongs_to_the_upper_position() {
+        assert_eq!(grid(0.5, 1.0), 1);
+        assert_eq!(grid(-0.5, 1.0), 0);
+        assert_eq!(grid(0.49, 1.0), 0);
+        assert_eq!(grid(-0.51, 1.0), -1);
+    }
+}

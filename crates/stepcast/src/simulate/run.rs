@@ -1,0 +1,387 @@
+//! The loop between a session and the virtual printer, in virtual time.
+//!
+//! The host's clock and the board's are not the same: the host's starts anywhere, and the board's crystal is a little off,
+//! so that the session has to find out both.
+
+use std::time::Instant;
+
+use printer::{
+    config::PrinterConfig,
+    error::PrinterError,
+    machine::{EXTRUDER, MOTOR_NAMES},
+    session::{JobOptions, JobStatus, Request, Session},
+};
+use units::{Hertz, Seconds, Ticks};
+use virtual_printer::VirtualPrinter;
+
+use super::{
+    observer::{Observer, Wish},
+    own_error, pins,
+    report::{After, Motor, Outcome, Report},
+    tally::Tally,
+    wiring,
+};
+use crate::{
+    cli::{Board, SimulateArgs},
+    console::{ErrorReport, Progress},
+    input::Input,
+};
+
+/// The host's clock when the board's starts.
+const HOST_START: Seconds = Seconds(4321.0);
+/// How much faster than it says the board's clock runs, as crystals do.
+const CRYSTAL_ERROR: f64 = 30e-6;
+/// The session is called again after this time at the earliest, whatever it asks for.
+const WAKE_MIN: Seconds = Seconds(50e-6);
+/// After the end the machine is watched for so long: long enough for the board's own watch over its heaters.
+const AFTER: Seconds = Seconds(6.0);
+/// A print in which nothing happens for so long is given up.
+const STALL_MAX: Seconds = Seconds(6.0 * 3600.0);
+/// How often the nozzle's temperature is looked at.
+const SAMPLE_INTERVAL: Seconds = Seconds(0.1);
+/// The nozzle counts as extruding for so long after a step of the extruder's.
+const EXTRUDING: Seconds = Seconds(0.25);
+/// The path may be this far off, or by a step of each axis where that is more.
+const PATH_ERROR_MAX_MM: f64 = 0.02;
+/// The progress bar is drawn this often, in rounds of the loop.
+const ROUNDS_PER_DRAW: u32 = 256;
+
+/// The host's clock, as the board's tells it.
+#[derive(Clone, Copy, Debug)]
+struct HostClock {
+    start: Ticks,
+    ticks_per_s: f64,
+}
+
+impl HostClock {
+    fn new(start: Ticks, clock: Hertz) -> Self {
+        Self { start, ticks_per_s: f64::from(clock.0) * (1.0 + CRYSTAL_ERROR) }
+    }
+
+    fn at(self, now: Ticks) -> Seconds {
+        Seconds(HOST_START.0 + now.saturating_sub(self.start).0 as f64 / self.ticks_per_s)
+    }
+
+    /// The first tick at or after a time.
+    fn ticks_at(self, time: Seconds) -> Ticks {
+        Ticks(self.start.0 + ((time - HOST_START).0 * self.ticks_per_s).ceil().max(0.0) as u64)
+    }
+}
+
+/// How far the simulation is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Connecting,
+    Printing,
+    /// Over; the machine is watched until then.
+    Watching(Ticks),
+}
+
+/// A print on the virtual printer.
+pub(super) struct Simulation {
+    printer: VirtualPrinter<Tally>,
+    session: Session,
+    clock: HostClock,
+    observer: Observer,
+    job: Input,
+    job_fed: bool,
+    options: JobOptions,
+    stage: Stage,
+    next_sample: Ticks,
+    seed: u64,
+    path_error_max_mm: f64,
+    wall_s: f64,
+    after: After,
+}
+
+impl Simulation {
+    /// Powers the machine up and opens the file.
+    pub(super) fn new(
+        args: &SimulateArgs,
+        mut config: PrinterConfig,
+        options: JobOptions,
+    ) -> anyhow::Result<Self> {
+        let board = pins::fit(&mut config, args.machine.board.map(Board::profile).as_ref())?;
+        let machine = wiring::machine(&config)?;
+        let step_distances = printer::machine::step_distances(&config).map(|distance| distance.0);
+        let tally = Tally::new(step_distances, board.clock);
+        let host_hz = board.clock;
+        let printer = VirtualPrinter::new(board, &machine, &args.machine.faults(), args.machine.seed, tally)?;
+        let clock = HostClock::new(printer.start(), host_hz);
+        let [x, y, z, _] = step_distances;
+        Ok(Self {
+            observer: Observer::new(&config, Input::open(&args.file)?, printer.start()),
+            session: Session::new(config, clock.at(printer.now())),
+            clock,
+            job: Input::open(&args.file)?,
+            job_fed: false,
+            options,
+            stage: Stage::Connecting,
+            next_sample: printer.start(),
+            seed: args.machine.seed,
+            path_error_max_mm: PATH_ERROR_MAX_MM.max((x * x + y * y + z * z).sqrt()),
+            wall_s: 0.0,
+            after: After::default(),
+            printer,
+        })
+    }
+
+    /// Prints the file to its end, or until something fails.
+    pub(super) fn run(&mut self) -> anyhow::Result<()> {
+        let began = Instant::now();
+        let progress = Progress::new("simulating", self.job.size());
+        let mut to_host = Vec::new();
+        let mut to_board = Vec::new();
+        let mut rounds = 0u32;
+        loop {
+            let wake = self.attend(&mut to_board)?;
+            if let Stage::Watching(until) = self.stage
+                && self.printer.now() >= until
+            {
+                break;
+            }
+            self.check_stall()?;
+            let now = self.printer.now();
+            let earliest = now + self.ticks(WAKE_MIN);
+            let until = self.clock.ticks_at(wake).max(earliest).min(self.next_sample.max(earliest));
+            self.printer.run_until(until, &mut to_host);
+            let now = self.printer.now();
+            if !to_host.is_empty() {
+                self.session.receive(&to_host, self.clock.at(now));
+                to_host.clear();
+            }
+            if now >= self.next_sample {
+                self.sample(now);
+            }
+            rounds = rounds.wrapping_add(1);
+            if rounds.is_multiple_of(ROUNDS_PER_DRAW) {
+                self.draw(&progress);
+            }
+        }
+        self.wall_s = began.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Lets the session work: its bytes, its events, the file that it wants. Returns when it wants to be called again.
+    fn attend(&mut self, to_board: &mut Vec<u8>) -> anyhow::Result<Seconds> {
+        loop {
+            let now = self.clock.at(self.printer.now());
+            let wake = self.session.poll(now, to_board);
+            if !to_board.is_empty() {
+                self.printer.write(to_board);
+                to_board.clear();
+            }
+            let acted = self.take_events(now);
+            let fed = self.feed()?;
+            if !acted && !fed {
+                self.observer.queued(self.session.motion_queued(now));
+                return Ok(wake);
+            }
+        }
+    }
+
+    /// Whether anything came of the session's events.
+    fn take_events(&mut self, now: Seconds) -> bool {
+        let mut acted = false;
+        for event in self.session.take_events() {
+            let Some(wish) = self.observer.take(event, &mut self.printer) else { continue };
+            acted = true;
+            let result = match wish {
+                Wish::Start if self.stage == Stage::Connecting => {
+                    self.stage = Stage::Printing;
+                    self.session.start_job(self.options.clone(), now)
+                }
+                Wish::Resume => self.session.request(Request::Resume, now),
+                Wish::End => {
+                    self.end();
+                    Ok(())
+                }
+                Wish::Start => Ok(()),
+            };
+            if let Err(error) = result {
+                self.observer.error.get_or_insert(error);
+                self.end();
+            }
+        }
+        acted
+    }
+
+    fn end(&mut self) {
+        if !matches!(self.stage, Stage::Watching(_)) {
+            self.stage = Stage::Watching(self.printer.now() + self.ticks(AFTER));
+        }
+    }
+
+    /// Feeds the session what it wants of the file.
+    fn feed(&mut self) -> Result<bool, PrinterError> {
+        if self.job_fed || self.stage != Stage::Printing || self.session.job_status() == JobStatus::None {
+            return Ok(false);
+        }
+        let wants = self.session.job_wants();
+        if wants == 0 {
+            return Ok(false);
+        }
+        let chunk = self.job.next(wants)?;
+        if chunk.is_empty() {
+            self.session.job_end();
+            self.job_fed = true;
+        } else {
+            self.session.job_feed(chunk);
+        }
+        Ok(true)
+    }
+
+    fn sample(&mut self, now: Ticks) {
+        self.next_sample = now + self.ticks(SAMPLE_INTERVAL);
+        let extruding = self.ticks(EXTRUDING);
+        let state = self.printer.state();
+        let tally = self.printer.recorder_mut();
+        // Up to now, no pulse is missing.
+        tally.path.settle(now);
+        let extruding = tally.extruded_at.is_some_and(|at| at + extruding >= now);
+        let time = self.clock.at(now);
+        if self.stage == Stage::Printing
+            && let Some(nozzle) = state.heaters.iter().find(|heater| heater.name == MOTOR_NAMES[EXTRUDER])
+        {
+            self.observer.nozzle.sample(time, nozzle.temperature, extruding);
+        }
+    }
+
+    fn check_stall(&self) -> anyhow::Result<()> {
+        let still = self.printer.now().saturating_sub(self.observer.last_change);
+        if still > self.ticks(STALL_MAX) {
+            anyhow::bail!(
+                "the simulated print did nothing for {} hours of its time after line {}",
+                STALL_MAX.0 / 3600.0,
+                self.observer.line
+            );
+        }
+        Ok(())
+    }
+
+    fn ticks(&self, duration: Seconds) -> Ticks {
+        self.printer.profile().clock.ticks_in(duration)
+    }
+
+    fn virtual_time(&self) -> Seconds {
+        self.printer.profile().clock.duration_of(self.printer.now() - self.printer.start())
+    }
+
+    fn draw(&self, progress: &Progress) {
+        progress.set(self.job.position());
+        progress.say(format!("line {}, {:.0} s", self.observer.line, self.virtual_time().0));
+    }
+
+    /// What came of it.
+    pub(super) fn into_report(mut self) -> Report {
+        let virtual_time = self.virtual_time();
+        let now = self.printer.now();
+        self.observer.finish();
+        let state = self.printer.state();
+        let profile_name = self.printer.profile().name;
+        let tally = self.printer.recorder_mut();
+        if self.observer.done {
+            tally.path.finish();
+        } else {
+            tally.path.settle(now);
+        }
+        let still = tally.last_step.is_none_or(|at| at + Ticks(1) < now);
+        self.after = After {
+            heaters_off: state.heaters.iter().all(|heater| heater.duty == 0.0),
+            motors_still: still,
+            shutdown: state.shutdown.map(|reason| reason.text().to_owned()),
+        };
+        let mut motors = std::collections::BTreeMap::new();
+        for (motor, &name) in MOTOR_NAMES.iter().enumerate() {
+            let lost_steps = state.motors.get(motor).map_or(0, |view| view.lost.0);
+            motors.insert(
+                name,
+                Motor {
+                    planned_steps: self.observer.planned[motor],
+                    counted_steps: tally.pulses[motor],
+                    lost_steps,
+                    end_position_mm: tally.path.position_mm(motor),
+                },
+            );
+        }
+        let error = self
+            .observer
+            .session_error()
+            .or_else(|| wrong(&self.observer, tally, &motors, self.path_error_max_mm).map(own_error));
+        let worst = tally.path.worst();
+        let stats = self.session.link_stats().unwrap_or_default();
+        Report {
+            result: if error.is_none() { Outcome::Done } else { Outcome::Failed },
+            reason: error.as_ref().map(|error: &ErrorReport| error.what_happened.clone()),
+            error,
+            blocking_lines: Vec::new(),
+            board: profile_name,
+            seed: self.seed,
+            print_time_s: self.observer.print_time.0,
+            virtual_time_s: virtual_time.0,
+            speed_ratio: if self.wall_s > 0.0 { virtual_time.0 / self.wall_s } else { 0.0 },
+            moves: self.observer.moves,
+            path_error_max_mm: worst.distance_mm,
+            path_error_line: (worst.line > 0).then_some(worst.line),
+            filament_error_max_mm: tally.path.filament_worst_mm(),
+            temperature_error_max_c: self.observer.nozzle.error_max().map(|error| error.0),
+            temperature_overshoot_max_c: self.observer.nozzle.overshoot_max().0,
+            sent_bytes: stats.bytes_sent,
+            retransmitted_bytes: stats.bytes_retransmitted,
+            damaged_bytes: state.damaged_bytes,
+            min_queued_s: self.observer.min_queued.map(|ahead| ahead.0),
+            pulse_digest: tally.digest.text(),
+            homing: std::mem::take(&mut self.observer.homing),
+            pauses: self.observer.pauses,
+            after: self.after,
+            motors,
+        }
+    }
+}
+
+/// What is wrong with the pulses of a print that the session takes for done.
+fn wrong(
+    observer: &Observer,
+    tally: &Tally,
+    motors: &std::collections::BTreeMap<&'static str, Motor>,
+    path_error_max_mm: f64,
+) -> Option<String> {
+    if let Some(mismatch) = &observer.mismatch {
+        return Some(mismatch.clone());
+    }
+    for (name, motor) in motors {
+        let Motor { planned_steps, counted_steps, lost_steps, .. } = motor;
+        if planned_steps != counted_steps {
+            return Some(format!(
+                "{name}: {planned_steps} steps were planned, {counted_steps} pulses were counted"
+            ));
+        }
+        if *lost_steps != 0 {
+            return Some(format!("{name} lost {lost_steps} steps: it was driven harder than it can"));
+        }
+    }
+    let worst = tally.path.worst();
+    if worst.distance_mm > path_error_max_mm {
+        let (distance, line) = (worst.distance_mm, worst.line);
+        return Some(format!("the path strays by {distance:.3} mm from line {line}"));
+    }
+    let (strays, _) = tally.path.strays();
+    (strays > 0).then(|| format!("{strays} pulses came while no line was being executed"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn host_time_and_ticks_agree() {
+        let clock = HostClock::new(Ticks(1 << 32), Hertz(12_000_000));
+        assert_eq!(clock.at(Ticks(1 << 32)), HOST_START);
+        for ticks in [1u64, 17, 12_000_000, 75_000_000_000] {
+            let at = Ticks((1 << 32) + ticks);
+            let back = clock.ticks_at(clock.at(at));
+            assert!(back.0.abs_diff(at.0) <= 1, "{ticks}");
+        }
+        assert_eq!(clock.ticks_at(Seconds(0.0)), Ticks(1 << 32));
+    }
+}

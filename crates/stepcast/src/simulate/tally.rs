@@ -1,0 +1,59 @@
+//! What watches the simulated motors' pins: counts, the path they draw, and their fingerprint.
+
+use printer::machine::{EXTRUDER, MOTORS};
+use units::{Hertz, Ticks};
+use virtual_printer::Recorder;
+
+use super::{digest::Digest, path_check::PathCheck};
+
+/// Everything that is made of the pulses, as they come.
+#[derive(Clone, Debug)]
+pub(crate) struct Tally {
+    /// Pulses of each motor, both directions.
+    pub(crate) pulses: [u64; MOTORS],
+    /// The path that they draw.
+    pub(crate) path: PathCheck,
+    /// Their fingerprint.
+    pub(crate) digest: Digest,
+    /// The last step of the extruder that pushed filament.
+    pub(crate) extruded_at: Option<Ticks>,
+    /// The last step of any motor.
+    pub(crate) last_step: Option<Ticks>,
+}
+
+impl Tally {
+    /// Nothing has been seen of a machine with these step distances.
+    pub(crate) fn new(step_distance_mm: [f64; MOTORS], clock: Hertz) -> Self {
+        Self {
+            pulses: [0; MOTORS],
+            path: PathCheck::new(step_distance_mm, clock),
+            digest: Digest::default(),
+            extruded_at: None,
+            last_step: None,
+        }
+    }
+}
+
+impl Recorder for Tally {
+    #[inline]
+    fn step(&mut self, motor: usize, at: Ticks, forward: bool, count: i64) {
+        let Some(pulses) = self.pulses.get_mut(motor) else { return };
+        *pulses += 1;
+        self.last_step = Some(at);
+        if motor == EXTRUDER && forward {
+            self.extruded_at = Some(at);
+        }
+        self.digest.step(motor, at, forward);
+        self.path.pulse(motor, at, count);
+    }
+
+    #[inline]
+    fn step_end(&mut self, motor: usize, at: Ticks) {
+        self.digest.step_end(motor, at);
+    }
+
+    #[inline]
+    fn direction(&mut self, motor: usize, at: Ticks, forward: bool) {
+        self.digest.direction(motor, at, forward);
+    }
+}

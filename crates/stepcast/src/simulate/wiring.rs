@@ -1,0 +1,122 @@
+//! From a `printer.cfg` to the simulated machine: what the file calls a pin gets a part of a usual printer wired to it.
+//!
+//! The file knows pins, directions and distances; masses, torques and heaters it does not know, so those are of a usual
+//! desktop printer. Order of motors: X, Y, Z, extruder, as everywhere.
+
+use printer::{
+    config::{HeaterConfig, MotorConfig, PinSpec, PrinterConfig, StepperConfig},
+    machine::{EXTRUDER, MOTOR_NAMES},
+};
+use units::{Celsius, Mm, Ohms};
+use virtual_printer::{
+    Endstop, Fan, Filament, Heater, Machine, Mechanics, Motor, Plant, Sensor, Side, Thermistor, Wire,
+};
+
+/// What each axis moves, in kg: the carriage, the bed, the gantry.
+const MOVED_KG: [f64; 3] = [0.4, 0.8, 0.8];
+/// What the Z motor holds up, as a torque: the gantry's weight is small behind a screw.
+const GRAVITY_M_S2: f64 = 9.81;
+/// At power-up an axis stands this far from its endstop, or in the middle of a shorter one.
+const START_FROM_ENDSTOP_MM: f64 = 40.0;
+/// The frame is this far beyond the positions that may be used.
+const FRAME_MARGIN_MM: f64 = 3.0;
+/// Where a sensor's curve is taken from the machine file.
+const CURVE_POINTS_C: [f64; 3] = [25.0, 150.0, 250.0];
+
+/// Builds the machine that a file describes.
+pub(crate) fn machine(config: &PrinterConfig) -> anyhow::Result<Machine> {
+    let mut machine = Machine::default();
+    for (axis, stepper) in config.steppers.iter().enumerate() {
+        machine.motors.push(axis_motor(axis, stepper));
+        machine.endstops.push(Endstop {
+            name: MOTOR_NAMES[axis].to_owned(),
+            wire: wire(&stepper.endstop_pin),
+            motor: axis,
+            side: if stepper.homing_positive_dir { Side::Max } else { Side::Min },
+            position: stepper.position_endstop,
+        });
+    }
+    if let Some(fan) = &config.fan {
+        machine.fans.push(Fan { name: "fan".to_owned(), wire: wire(&fan.pin) });
+    }
+    if let Some(extruder) = &config.extruder {
+        let mechanics = Mechanics {
+            full_steps_per_rotation: extruder.motor.full_steps_per_rotation,
+            ..Mechanics::extruder(extruder.motor.microsteps)
+        };
+        machine.motors.push(motor(EXTRUDER, &extruder.motor, mechanics, Mm::ZERO, None));
+        machine.heaters.push(Heater {
+            fan: config.fan.as_ref().map(|_| 0),
+            filament: Some(Filament { motor: EXTRUDER, diameter: extruder.filament_diameter }),
+            ..heater(&extruder.heater, Plant::hot_end())?
+        });
+    }
+    if let Some(bed) = &config.heater_bed {
+        machine.heaters.push(heater(bed, Plant::bed())?);
+    }
+    Ok(machine)
+}
+
+fn axis_motor(axis: usize, stepper: &StepperConfig) -> Motor {
+    let mm_per_rotation = stepper.motor.rotation_distance.0 / stepper.motor.gear_ratio;
+    let mut mechanics = Mechanics {
+        full_steps_per_rotation: stepper.motor.full_steps_per_rotation,
+        ..Mechanics::nema17(stepper.motor.microsteps, mm_per_rotation, MOVED_KG[axis])
+    };
+    if axis == 2 {
+        mechanics.load_nm = MOVED_KG[2] * GRAVITY_M_S2 * mm_per_rotation / 1000.0 / std::f64::consts::TAU;
+    }
+    let (min, max) = (stepper.position_min.0, stepper.position_max.0);
+    let away = START_FROM_ENDSTOP_MM.min((max - min) / 2.0);
+    let endstop = stepper.position_endstop.0;
+    let start = if stepper.homing_positive_dir { endstop - away } else { endstop + away };
+    let frame = (Mm(min.min(endstop) - FRAME_MARGIN_MM), Mm(max.max(endstop) + FRAME_MARGIN_MM));
+    motor(axis, &stepper.motor, mechanics, Mm(start), Some(frame))
+}
+
+fn motor(
+    index: usize,
+    config: &MotorConfig,
+    mechanics: Mechanics,
+    start: Mm,
+    frame: Option<(Mm, Mm)>,
+) -> Motor {
+    Motor {
+        name: MOTOR_NAMES[index].to_owned(),
+        step: wire(&config.step_pin),
+        dir: wire(&config.dir_pin),
+        enable: config.enable_pin.as_ref().map(wire),
+        mechanics,
+        step_distance: config.step_distance(),
+        start,
+        frame,
+    }
+}
+
+fn heater(config: &HeaterConfig, plant: Plant) -> anyhow::Result<Heater> {
+    let divider = &config.thermistor;
+    let points = CURVE_POINTS_C.map(|celsius| {
+        let ohms = divider.curve.resistance(Celsius(celsius)).0 + divider.inline.0;
+        (Celsius(celsius), Ohms(ohms))
+    });
+    let Some(thermistor) = Thermistor::steinhart_hart(points) else {
+        anyhow::bail!(
+            "[{}] sensor_type: {} cannot be simulated: only sensors whose resistance falls with temperature (NTC) can",
+            config.name,
+            config.sensor_type
+        );
+    };
+    Ok(Heater {
+        name: config.name.clone(),
+        wire: wire(&config.heater_pin),
+        sensor_pin: config.sensor_pin.name.clone(),
+        sensor: Sensor { thermistor, pull_up: divider.pullup, ..Sensor::default() },
+        plant,
+        fan: None,
+        filament: None,
+    })
+}
+
+fn wire(pin: &PinSpec) -> Wire {
+    Wire::new(pin.name.clone(), pin.inverted)
+}
