@@ -161,15 +161,22 @@ impl Compressor {
     /// A step against the direction of the last one, `gap` later.
     fn step_back(&mut self, time: f64, gap: f64) {
         if gap < self.gap_min {
-            self.times.pop();
-            let before = self.times.len().checked_sub(2).map_or(self.base_time, |i| self.times[i]);
-            self.gap_before = self.times.last().map_or(0.0, |last| last - before);
-            return;
+            return self.take_back();
         }
         self.emit_all(time);
         self.forward = !self.forward;
         self.gap_before = gap;
         self.times.push(time);
+    }
+
+    /// The last step never was. The one before it has been fitted in already, and must wait for its neighbour again.
+    fn take_back(&mut self) {
+        self.times.pop();
+        let Some(last) = self.times.pop() else { return };
+        self.stabbing.clear();
+        self.take_last(last);
+        self.gap_before = last - self.times.last().copied().unwrap_or(self.base_time);
+        self.times.push(last);
     }
 
     /// Nothing comes before `time`: gives out what could not go on beyond it.

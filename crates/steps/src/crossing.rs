@@ -83,7 +83,7 @@ impl Quadratic {
         let forward = self.to >= self.from;
         let sign = if forward { 1.0 } else { -1.0 };
         // Rounding at the seam of two pieces may put the target a step behind: the next piece then finds it.
-        let steps = if forward { target - *count } else { *count - target };
+        let steps = if forward { target.saturating_sub(*count) } else { count.saturating_sub(target) };
         if steps <= 0 {
             return;
         }

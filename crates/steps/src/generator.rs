@@ -2,6 +2,7 @@
 
 use crate::compressor::{Compressor, gap_min_ticks};
 use crate::crossing::{Grid, Piece, nearest_step};
+use crate::stabbing::larger;
 use crate::{Cartesian, Kinematics, MotorSegment, StepCommand};
 use motion::{PlannedMove, RUN_TIME_MAX};
 use std::collections::VecDeque;
@@ -207,9 +208,9 @@ impl<K: Kinematics> StepGenerator<K> {
             return Err(PushError::Full);
         }
         let end_time = planned.end_time();
+        let times = [planned.start_time, planned.accel_time, planned.cruise_time, planned.decel_time];
         // Written so that NaN is refused too.
-        if !(planned.start_time >= 0.0 && end_time >= planned.start_time && end_time <= 2.0 * RUN_TIME_MAX.0)
-        {
+        if !(times.iter().all(|&time| time >= 0.0) && end_time <= 2.0 * RUN_TIME_MAX.0) {
             return Err(PushError::Range { motor: 0 });
         }
         self.staged.clear();
@@ -320,15 +321,15 @@ impl Motor {
     /// Generates some steps; `false` where nothing can be done before more is pushed.
     fn advance(&mut self, pushed: f64, ended: bool) -> bool {
         let Some(piece) = self.pieces.front_mut() else {
-            let is_new = self.generated < pushed;
-            self.generated = self.generated.max(pushed);
+            let before = self.generated;
             if ended {
                 self.generated = f64::INFINITY;
                 self.compressor.end();
-                return is_new || self.compressor.is_ready();
+            } else {
+                self.generated = larger(before, pushed);
+                self.compressor.idle_until(pushed);
             }
-            self.compressor.idle_until(pushed);
-            return is_new || self.compressor.is_ready();
+            return self.generated > before || self.compressor.is_ready();
         };
         for _ in 0..TURN_STEPS {
             if piece.steps == 0 {
