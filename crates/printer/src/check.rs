@@ -5,7 +5,7 @@
 //! costs no more memory than one with a thousand.
 
 use gcode::{
-    Action, CHORD_TOLERANCE, Diagnostic, Heater, Interpreter, LineNumber, Lines, Move, Severity, Settings,
+    Action, CHORD_TOLERANCE, Diagnostic, Heater, Interpreter, LineNumber, Lines, Move, Settings, Severity,
 };
 use units::Celsius;
 
@@ -111,7 +111,7 @@ impl Checker {
             self.report.lines = number.0;
             self.interpreter.line(number, line.bytes, &mut self.actions, &mut self.found);
             for action in core::mem::take(&mut self.actions) {
-                self.act(action, number);
+                self.act(&action, number);
             }
             for diagnostic in core::mem::take(&mut self.found) {
                 self.remark(diagnostic);
@@ -154,10 +154,10 @@ impl Checker {
         }
     }
 
-    fn act(&mut self, action: Action, line: LineNumber) {
-        match action {
-            Action::Move(mv) => self.judge(&mv),
-            Action::Arc(arc) => arc.chords(CHORD_TOLERANCE).for_each(|chord| self.judge(&chord)),
+    fn act(&mut self, action: &Action, line: LineNumber) {
+        match *action {
+            Action::Move(ref mv) => self.judge(mv),
+            Action::Arc(ref arc) => arc.chords(CHORD_TOLERANCE).for_each(|chord| self.judge(&chord)),
             Action::Home { x, y, z } => self.home([x, y, z]),
             Action::SetTemperature { heater, target, .. } => self.target(heater, target, line),
             Action::TurnOffHeaters => self.nozzle = Celsius::ZERO,
@@ -199,7 +199,8 @@ impl Checker {
     fn home(&mut self, axes: [bool; 3]) {
         let mut at = [None; 3];
         for axis in (0..3).filter(|&axis| axes[axis]) {
-            at[axis] = Some(self.config.as_ref().map_or(0.0, |config| config.steppers[axis].position_endstop.0));
+            at[axis] =
+                Some(self.config.as_ref().map_or(0.0, |config| config.steppers[axis].position_endstop.0));
             if let Some(guard) = &mut self.guard {
                 guard.set_homed(axis, true);
             }

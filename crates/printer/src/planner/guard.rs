@@ -5,7 +5,10 @@
 
 use gcode::Move;
 
-use crate::{config::PrinterConfig, error::{ErrorCode, PrinterError}};
+use crate::{
+    config::PrinterConfig,
+    error::{ErrorCode, PrinterError},
+};
 
 /// Names of the axes in messages.
 const AXES: [&str; 3] = ["X", "Y", "Z"];
@@ -53,7 +56,8 @@ impl Guard {
             extrude_only_max_mm: extruder.max_extrude_only_distance.0,
             min_extrude_celsius: extruder.heater.min_extrude_temp.0,
         });
-        let cold_allowed = extruder.as_ref().is_none_or(|extruder: &ExtruderGuard| extruder.min_extrude_celsius <= 0.0);
+        let cold_allowed =
+            extruder.as_ref().is_none_or(|extruder: &ExtruderGuard| extruder.min_extrude_celsius <= 0.0);
         let extrusion =
             if cold_allowed { ExtrusionPermit::Allowed } else { ExtrusionPermit::TooCold { celsius: 0.0 } };
         Self { limits_mm, homed: [false; 3], extruder, extrusion }
@@ -83,10 +87,8 @@ impl Guard {
             }
             let (min, max) = self.limits_mm[axis];
             if !(min - LIMIT_SLACK_MM..=max + LIMIT_SLACK_MM).contains(&to[axis]) {
-                let detail = format!(
-                    "{} {:.3} mm lies outside {min:.3} to {max:.3} mm",
-                    AXES[axis], to[axis]
-                );
+                let detail =
+                    format!("{} {:.3} mm lies outside {min:.3} to {max:.3} mm", AXES[axis], to[axis]);
                 return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(mv.line.0));
             }
         }

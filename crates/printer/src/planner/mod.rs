@@ -185,11 +185,11 @@ impl Planner {
     /// A planner for a machine and a board's clock. No axis is homed, and the machine stands at 0, 0, 0.
     pub fn new(config: &PrinterConfig, clock: Hertz) -> Result<Self, PrinterError> {
         let limits = machine::limits(config);
-        let look_ahead = LookAhead::new(limits.clone())
+        let look_ahead = LookAhead::new(limits)
             .map_err(|error| PrinterError::new(ErrorCode::ConfigInvalid, error.to_string()))?;
         Ok(Self {
             guard: Guard::new(config),
-            machine_limits: limits.clone(),
+            machine_limits: limits,
             look_ahead,
             limits,
             generator: machine::step_generator(config, clock)?,
@@ -277,7 +277,12 @@ impl Planner {
     }
 
     /// A single straight move outside any source, not judged by the guard: homing, and going back after a pause.
-    pub fn push_raw_move(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
+    pub fn push_raw_move(
+        &mut self,
+        to: Position,
+        feed: MmPerS,
+        line: LineNumber,
+    ) -> Result<(), PrinterError> {
         self.push(to, feed, line)
     }
 
@@ -354,8 +359,7 @@ impl Planner {
             Action::WaitForMoves => self.barrier = Some((line, Barrier::WaitForMoves)),
             Action::Pause(reason) => self.barrier = Some((line, Barrier::Pause(reason))),
             Action::EmergencyStop => self.barrier = Some((line, Barrier::EmergencyStop)),
-            Action::SelectTool(0) => {}
-            Action::SelectTool(tool) => {
+            Action::SelectTool(tool) if tool > 0 => {
                 let detail = format!("tool T{tool} is not in the machine file");
                 return Err(PrinterError::new(ErrorCode::NoSuchHeater, detail).at_line(line.0));
             }
@@ -365,10 +369,17 @@ impl Planner {
             Action::TurnOffHeaters => self.defer(line, TimedAction::TurnOffHeaters),
             Action::Cancel => self.barrier = Some((line, Barrier::Cancel)),
             Action::PressureAdvance { .. } => {
-                self.notice(line, "pressure advance is not applied by this version: the print is made without it");
+                self.notice(
+                    line,
+                    "pressure advance is not applied by this version: the print is made without it",
+                );
             }
-            // The interpreter has these in its moves already; the machine file knows the machine's limits.
-            Action::SpeedFactor(_) | Action::FlowFactor(_) | Action::MachineLimits(_) => {}
+            // The interpreter has the factors in its moves already; the machine file knows the machine's limits; there
+            // is only one tool.
+            Action::SpeedFactor(_)
+            | Action::FlowFactor(_)
+            | Action::MachineLimits(_)
+            | Action::SelectTool(_) => {}
         }
         Ok(())
     }
@@ -386,7 +397,7 @@ impl Planner {
     /// A file may ask for less than the machine file allows, never for more.
     fn limit(&mut self, limit: VelocityLimit) {
         let machine = &self.machine_limits;
-        let mut limits = self.limits.clone();
+        let mut limits = self.limits;
         if let Some(velocity) = limit.velocity {
             limits.max_velocity = velocity.min(machine.max_velocity);
         }
@@ -400,7 +411,7 @@ impl Planner {
             limits.minimum_cruise_ratio = ratio;
         }
         // Limits that make no sense (zero, not a number) leave those that hold.
-        if self.look_ahead.set_limits(limits.clone()).is_ok() {
+        if self.look_ahead.set_limits(limits).is_ok() {
             self.limits = limits;
         }
     }
@@ -436,9 +447,7 @@ impl Planner {
         }
         let before = self.look_ahead.len();
         let request = MoveRequest { from: self.position, to, feed, tag: line.0 };
-        self.look_ahead
-            .push(&request)
-            .map_err(|error| wrong(&error).at_line(line.0))?;
+        self.look_ahead.push(&request).map_err(|error| wrong(&error).at_line(line.0))?;
         // The look-ahead drops moves without length.
         self.moves_pushed += (self.look_ahead.len() - before) as u64;
         self.position = to;
@@ -450,7 +459,8 @@ impl Planner {
         self.planned_until = Seconds(planned.end_time());
         self.moves_planned += 1;
         self.ready.push_back(Planned::Move(planned));
-        while let Some(deferred) = self.deferred.pop_front_if(|deferred| deferred.after <= self.moves_planned) {
+        while let Some(deferred) = self.deferred.pop_front_if(|deferred| deferred.after <= self.moves_planned)
+        {
             let Deferred { line, action, .. } = deferred;
             self.ready.push_back(Planned::Timed { at: self.planned_until, line, action });
         }

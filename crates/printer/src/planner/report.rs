@@ -110,7 +110,11 @@ impl PlanStream {
         Ok(self.report)
     }
 
-    fn run(&mut self, blocks: &mut Vec<u8>, mut each_move: impl FnMut(&PlannedMove)) -> Result<(), PrinterError> {
+    fn run(
+        &mut self,
+        blocks: &mut Vec<u8>,
+        mut each_move: impl FnMut(&PlannedMove),
+    ) -> Result<(), PrinterError> {
         loop {
             match self.planner.next(&mut self.source)? {
                 Planned::NeedsInput | Planned::EndOfSource => return Ok(()),
@@ -156,7 +160,9 @@ impl PlanStream {
         let oid = command.motor as u8;
         let message = match command.kind {
             StepCommandKind::SetDir { forward } => Command::SetNextStepDir { oid, dir: u8::from(forward) },
-            StepCommandKind::QueueStep { interval, count, add } => Command::QueueStep { oid, interval, count, add },
+            StepCommandKind::QueueStep { interval, count, add } => {
+                Command::QueueStep { oid, interval, count, add }
+            }
         };
         self.pack_message(&message, blocks);
     }

@@ -11,8 +11,10 @@ use crate::{
     link::{Lane, Link, Outgoing},
 };
 
-/// How far ahead of its clock an output is set: several round trips, so that a retransmission does not come too late.
-pub(super) const OUTPUT_LEAD: Seconds = Seconds(0.4);
+/// How far ahead of its clock an output is set on a link that works: several round trips …
+const OUTPUT_LEAD: Seconds = Seconds(0.3);
+/// … and on one that has been losing blocks, where a message may have to be sent again more than once.
+const OUTPUT_LEAD_LOSSY: Seconds = Seconds(1.0);
 /// How far ahead a run of motion starts on a link that works …
 const RUN_LEAD: Seconds = Seconds(0.25);
 /// … and on one that has been losing blocks.
@@ -53,14 +55,18 @@ impl Board {
 
     /// The clock at which an output that is to change "now" changes.
     pub(super) fn output_clock(&self, now: Seconds) -> Ticks {
-        self.clock_at(now) + self.ticks(OUTPUT_LEAD)
+        let lead = if self.is_lossy(now) { OUTPUT_LEAD_LOSSY } else { OUTPUT_LEAD };
+        self.clock_at(now) + self.ticks(lead)
     }
 
     /// The clock at which a run of motion that is to start "now" starts.
     pub(super) fn run_clock(&self, now: Seconds) -> Ticks {
-        let lossy = self.losses.last.is_some_and(|last| now - last < LOSSY_FOR);
-        let lead = if lossy { RUN_LEAD_LOSSY } else { RUN_LEAD };
+        let lead = if self.is_lossy(now) { RUN_LEAD_LOSSY } else { RUN_LEAD };
         self.clock_at(now) + self.ticks(lead)
+    }
+
+    fn is_lossy(&self, now: Seconds) -> bool {
+        self.losses.last.is_some_and(|last| now - last < LOSSY_FOR)
     }
 
     /// Notes whether the link has been losing blocks.
@@ -88,7 +94,13 @@ impl Board {
 
     /// Sends a command of a motor's, in order: what it is for happens at `due`, and until `entry_until` it holds an
     /// entry of the move queue.
-    pub(super) fn motion(&mut self, motor: usize, command: &Command<'_>, due: Ticks, entry_until: Option<Ticks>) {
+    pub(super) fn motion(
+        &mut self,
+        motor: usize,
+        command: &Command<'_>,
+        due: Ticks,
+        entry_until: Option<Ticks>,
+    ) {
         self.send(Lane::Motion(motor as u8), command, |message| match entry_until {
             Some(end) => message.due(due).entry_until(end),
             None => message.due(due),

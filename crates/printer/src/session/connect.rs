@@ -2,9 +2,8 @@
 
 use units::{Hertz, Seconds};
 use wire::{
-    Command,
+    Command, Response,
     dictionary::{Dictionary, Received},
-    Response,
 };
 
 use super::{
@@ -47,7 +46,9 @@ impl Identifying {
         let mut result = Ok(None);
         link.receive(bytes, now, |payload| {
             let mut rest = payload.bytes;
-            while let Ok(Received::Known(Response::IdentifyResponse { offset, data })) = bootstrap.decode(&mut rest) {
+            while let Ok(Received::Known(Response::IdentifyResponse { offset, data })) =
+                bootstrap.decode(&mut rest)
+            {
                 match identify.receive(offset, data, now) {
                     Ok(None) => {}
                     Ok(Some(dictionary)) => result = Ok(Some(dictionary)),
@@ -117,9 +118,14 @@ pub(super) struct Connecting {
 }
 
 impl Connecting {
-    pub(super) fn new(link: Link, dictionary: Dictionary, config: &PrinterConfig) -> Result<(Self, Event), PrinterError> {
+    pub(super) fn new(
+        link: Link,
+        dictionary: Dictionary,
+        config: &PrinterConfig,
+    ) -> Result<(Self, Event), PrinterError> {
         let wrong = |detail: &str| PrinterError::new(ErrorCode::DictionaryIncomplete, detail);
-        let clock_freq = dictionary.number("CLOCK_FREQ").ok_or_else(|| wrong("the board does not tell CLOCK_FREQ"))?;
+        let clock_freq =
+            dictionary.number("CLOCK_FREQ").ok_or_else(|| wrong("the board does not tell CLOCK_FREQ"))?;
         if !(1000.0..=1e9).contains(&clock_freq) {
             return Err(wrong("the board's CLOCK_FREQ makes no sense"));
         }
@@ -164,7 +170,9 @@ impl Connecting {
         match self.config.take() {
             Some(Message::Shutdown { reason }) => return Ok(Outcome::Shutdown(reason)),
             // The reason follows as the answer to a command that is not carried out in that state.
-            Some(Message::Config { is_shutdown: true, .. }) => self.board.control(&Command::AllocateOids { count: 0 }),
+            Some(Message::Config { is_shutdown: true, .. }) => {
+                self.board.control(&Command::AllocateOids { count: 0 })
+            }
             Some(Message::Config { is_config, crc, move_count, .. }) => {
                 if let Some(outcome) = self.advance(is_config, crc, move_count)? {
                     return Ok(outcome);
@@ -183,7 +191,12 @@ impl Connecting {
         Ok(Outcome::Pending(wake.map_or(ask, |wake| wake.min(ask))))
     }
 
-    fn advance(&mut self, is_config: bool, crc: u32, move_count: u16) -> Result<Option<Outcome>, PrinterError> {
+    fn advance(
+        &mut self,
+        is_config: bool,
+        crc: u32,
+        move_count: u16,
+    ) -> Result<Option<Outcome>, PrinterError> {
         match self.step {
             Step::State if is_config => Ok(Some(Outcome::NeedsRestart)),
             Step::State if self.board.sync.is_settled() => {

@@ -69,7 +69,11 @@ enum Stage {
     /// Have the approach planned.
     Plan,
     /// On the way; `end` is when the move would end without an endstop.
-    Approach { end: Option<Ticks>, kept_alive: Seconds, heard: Seconds },
+    Approach {
+        end: Option<Ticks>,
+        kept_alive: Seconds,
+        heard: Seconds,
+    },
     /// The trigger has fired: ask where the motor stopped.
     PositionAfter,
     /// Have the way back planned.
@@ -154,7 +158,12 @@ impl AxisHoming {
     }
 
     /// Does what is due. `run_end` is the end of the run of motion that is being made, `at_rest` that there is none.
-    pub(super) fn poll(&mut self, board: &mut Board, now: Seconds, at_rest: bool) -> Result<Wish, PrinterError> {
+    pub(super) fn poll(
+        &mut self,
+        board: &mut Board,
+        now: Seconds,
+        at_rest: bool,
+    ) -> Result<Wish, PrinterError> {
         if core::mem::take(&mut self.abandon) {
             return Ok(Wish::Abandon);
         }
@@ -164,7 +173,8 @@ impl AxisHoming {
                 Ok(Wish::Wait)
             }
             Stage::Plan => {
-                let travel = if self.second { SECOND_TRAVEL_FACTOR * self.retract_mm } else { self.travel_mm };
+                let travel =
+                    if self.second { SECOND_TRAVEL_FACTOR * self.retract_mm } else { self.travel_mm };
                 let from_mm = self.endstop_mm - self.sign * travel;
                 let speed = self.speeds[usize::from(self.second)];
                 Ok(Wish::Move(HomingMove { from_mm, to_mm: self.endstop_mm, speed }))
@@ -203,7 +213,10 @@ impl AxisHoming {
             expire_reason: REASON_EXPIRED,
         });
         board.control(&Command::StepperStopOnTrigger { oid: self.stepper, trsync_oid: trsync });
-        board.control(&Command::TrsyncSetTimeout { oid: trsync, clock: (start + board.ticks(EXPIRE)).low().0 });
+        board.control(&Command::TrsyncSetTimeout {
+            oid: trsync,
+            clock: (start + board.ticks(EXPIRE)).low().0,
+        });
         board.control(&Command::EndstopHome {
             oid: self.oids.endstop.0,
             clock,
@@ -249,7 +262,14 @@ impl AxisHoming {
     }
 
     /// The board reports the trigger.
-    pub(super) fn on_trigger(&mut self, oid: u8, can_trigger: bool, reason: u8, now: Seconds, board: &mut Board) -> Result<(), PrinterError> {
+    pub(super) fn on_trigger(
+        &mut self,
+        oid: u8,
+        can_trigger: bool,
+        reason: u8,
+        now: Seconds,
+        board: &mut Board,
+    ) -> Result<(), PrinterError> {
         let Stage::Approach { heard, .. } = &mut self.stage else { return Ok(()) };
         if oid != self.oids.trsync.0 {
             return Ok(());
@@ -264,7 +284,9 @@ impl AxisHoming {
                 self.stopped(board);
                 Ok(())
             }
-            REASON_EXPIRED => Err(self.fail(ErrorCode::HomingTimeout, "the board heard nothing from the host")),
+            REASON_EXPIRED => {
+                Err(self.fail(ErrorCode::HomingTimeout, "the board heard nothing from the host"))
+            }
             _ => Err(self.fail(ErrorCode::EndstopNotReached, "")),
         }
     }
@@ -292,7 +314,14 @@ impl AxisHoming {
     }
 
     /// The board reports the state of a switch.
-    pub(super) fn on_endstop(&mut self, oid: u8, homing: bool, pin_value: bool, now: Seconds, board: &mut Board) -> Result<(), PrinterError> {
+    pub(super) fn on_endstop(
+        &mut self,
+        oid: u8,
+        homing: bool,
+        pin_value: bool,
+        now: Seconds,
+        board: &mut Board,
+    ) -> Result<(), PrinterError> {
         if oid != self.oids.endstop.0 {
             return Ok(());
         }

@@ -138,7 +138,13 @@ impl Builder<'_> {
         let Oid(oid) = self.oid();
         let off = u8::from(pin.inverted);
         let max_duration = self.ticks(max_duration);
-        self.commands.push(Command::ConfigDigitalOut { oid, pin: number, value: off, default_value: off, max_duration });
+        self.commands.push(Command::ConfigDigitalOut {
+            oid,
+            pin: number,
+            value: off,
+            default_value: off,
+            max_duration,
+        });
         let cycle_ticks = cycle.map_or(0, |cycle| self.ticks(cycle));
         if cycle_ticks > 0 {
             self.commands.push(Command::SetDigitalOutPwmCycle { oid, cycle_ticks });
@@ -187,14 +193,22 @@ impl Builder<'_> {
 
 impl Layout {
     /// Lays a machine out on a board.
-    pub(super) fn new(config: &PrinterConfig, dictionary: &Dictionary, clock_freq: f64) -> Result<Self, PrinterError> {
-        let wrong = |error: DictionaryError| PrinterError::new(ErrorCode::DictionaryIncomplete, error.to_string());
+    pub(super) fn new(
+        config: &PrinterConfig,
+        dictionary: &Dictionary,
+        clock_freq: f64,
+    ) -> Result<Self, PrinterError> {
+        let wrong =
+            |error: DictionaryError| PrinterError::new(ErrorCode::DictionaryIncomplete, error.to_string());
         dictionary.require(NEEDED).map_err(wrong)?;
         let mut builder = Builder { dictionary, clock_freq, commands: Vec::new(), oids: 0 };
         let mut steppers = [None; MOTORS];
         let [x, y, z] = &config.steppers;
-        let endstops =
-            [builder.endstop(&x.endstop_pin)?, builder.endstop(&y.endstop_pin)?, builder.endstop(&z.endstop_pin)?];
+        let endstops = [
+            builder.endstop(&x.endstop_pin)?,
+            builder.endstop(&y.endstop_pin)?,
+            builder.endstop(&z.endstop_pin)?,
+        ];
         for (slot, axis) in steppers.iter_mut().zip(&config.steppers) {
             *slot = Some(builder.stepper(&axis.motor)?);
         }

@@ -33,11 +33,7 @@ use self::{
     inbox::Message,
     ready::{Failure, Ready},
 };
-use crate::{
-    config::PrinterConfig,
-    error::PrinterError,
-    link::LinkStats,
-};
+use crate::{config::PrinterConfig, error::PrinterError, link::LinkStats};
 
 /// With nothing to do, the owner is asked to come back after this long.
 const IDLE_WAKE: Seconds = Seconds(1.0);
@@ -199,7 +195,7 @@ impl Session {
             Stage::Connecting(connecting) => match connecting.poll(now, out) {
                 Ok(Outcome::Pending(wake)) => wake,
                 Ok(outcome) => {
-                    self.on_connected(outcome, now);
+                    self.on_connected(&outcome, now);
                     now
                 }
                 Err(error) => {
@@ -223,10 +219,10 @@ impl Session {
         }
     }
 
-    fn on_connected(&mut self, outcome: Outcome, now: Seconds) {
+    fn on_connected(&mut self, outcome: &Outcome, now: Seconds) {
         let Stage::Connecting(connecting) = self.take_stage() else { return };
         let Connecting { board, .. } = *connecting;
-        match outcome {
+        match *outcome {
             Outcome::Pending(_) => {}
             Outcome::Ready => match Ready::new(self.config.clone(), board, now) {
                 Ok(ready) => self.enter(Stage::Ready(Box::new(ready))),

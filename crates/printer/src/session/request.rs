@@ -175,17 +175,18 @@ impl Ready {
         }
         let Some(target) = job.paused_at else { return Err(ErrorCode::Internal.into()) };
         if self.planner.guard.homed() != [true; 3] {
-            return Err(PrinterError::new(ErrorCode::NotHomed, "the position was lost while the job was paused"));
+            return Err(PrinterError::new(
+                ErrorCode::NotHomed,
+                "the position was lost while the job was paused",
+            ));
         }
         // Across first, at the greater height, then down: nothing is hit on the way. The filament stays as it is.
         let [_, _, z, e] = self.planner.position();
         let up = z.max(target[2]);
         let here = self.planner.position();
-        for to in [
-            [here[0], here[1], up, e],
-            [target[0], target[1], up, e],
-            [target[0], target[1], target[2], e],
-        ] {
+        for to in
+            [[here[0], here[1], up, e], [target[0], target[1], up, e], [target[0], target[1], target[2], e]]
+        {
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
         }
         self.planner.rejoin(&job.source);

@@ -126,7 +126,10 @@ impl MotionStream {
     fn switch_driver(motor: usize, on: bool, clock: Ticks, board: &mut Board) {
         let Some(enable) = board.layout.steppers[motor].and_then(|oids| oids.enable) else { return };
         let on_ticks = enable.on_ticks(f64::from(u8::from(on)));
-        board.control_at(&Command::QueueDigitalOut { oid: enable.oid.0, clock: clock.low().0, on_ticks }, clock);
+        board.control_at(
+            &Command::QueueDigitalOut { oid: enable.oid.0, clock: clock.low().0, on_ticks },
+            clock,
+        );
     }
 
     /// A motor's next step command, of the run that is being made.
@@ -201,7 +204,12 @@ impl MotionStream {
 
     /// How much motion the board has, in seconds from its clock: up to the first step that it has not acknowledged,
     /// or to the end of what has been generated. `None` where no run is being made.
-    pub(super) fn queued_on_board(&self, generated_until: Ticks, clock_now: Ticks, board: &Board) -> Option<Seconds> {
+    pub(super) fn queued_on_board(
+        &self,
+        generated_until: Ticks,
+        clock_now: Ticks,
+        board: &Board,
+    ) -> Option<Seconds> {
         let run = self.run?;
         let generated = run.end.unwrap_or(run.start + generated_until);
         let until = board.link.motion_covered().map_or(generated, |covered| covered.min(generated));

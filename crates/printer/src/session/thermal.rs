@@ -7,9 +7,13 @@ use gcode::Heater as HeaterName;
 use units::{Celsius, Seconds, Ticks};
 use wire::Command;
 
-use super::{board::Board, event::Event, layout::{HeaterOids, Output}};
+use super::{
+    board::Board,
+    event::Event,
+    layout::{HeaterOids, Output},
+};
 use crate::{
-    config::{HeaterConfig, PrinterConfig},
+    config::{FanConfig, HeaterConfig, PrinterConfig},
     error::{ErrorCode, PrinterError},
     heater::Heater,
     thermistor::Thermistor,
@@ -45,7 +49,7 @@ struct Channel {
 #[derive(Debug)]
 pub(super) struct Thermal {
     channels: Vec<Channel>,
-    fan: Option<Output>,
+    fan: Option<(Output, FanConfig)>,
     fan_last_update: Ticks,
     fan_speed: f64,
     started: Seconds,
@@ -63,7 +67,13 @@ impl Thermal {
         if let Some((heater, oids)) = config.heater_bed.as_ref().zip(layout.bed) {
             channels.push(Channel::start(HeaterName::Bed, heater, oids, board, now));
         }
-        Self { channels, fan: layout.fan, fan_last_update: Ticks(0), fan_speed: 0.0, started: now }
+        Self {
+            channels,
+            fan: layout.fan.zip(config.fan.clone()),
+            fan_last_update: Ticks(0),
+            fan_speed: 0.0,
+            started: now,
+        }
     }
 
     fn channel(&mut self, name: HeaterName) -> Result<&mut Channel, PrinterError> {
@@ -108,13 +118,17 @@ impl Thermal {
 
     /// The fan's speed at a clock, or as soon as is safe.
     pub(super) fn set_fan(&mut self, speed: f64, at: Option<Ticks>, board: &mut Board, now: Seconds) {
-        let Some(fan) = self.fan else { return };
-        let earliest = board.output_clock(now).max(Ticks(self.fan_last_update.0 + u64::from(fan.cycle_ticks)));
+        let Some((fan, config)) = &self.fan else { return };
+        let earliest =
+            board.output_clock(now).max(Ticks(self.fan_last_update.0 + u64::from(fan.cycle_ticks)));
         let clock = at.unwrap_or(earliest).max(earliest);
         self.fan_last_update = clock;
         self.fan_speed = speed;
-        let command =
-            Command::QueueDigitalOut { oid: fan.oid.0, clock: clock.low().0, on_ticks: fan.on_ticks(speed) };
+        let command = Command::QueueDigitalOut {
+            oid: fan.oid.0,
+            clock: clock.low().0,
+            on_ticks: fan.on_ticks(config.duty(speed)),
+        };
         board.control_at(&command, clock);
     }
 
@@ -179,14 +193,17 @@ impl Thermal {
 }
 
 impl Channel {
-    fn start(name: HeaterName, config: &HeaterConfig, oids: HeaterOids, board: &mut Board, now: Seconds) -> Self {
-        let thermistor = config.thermistor.clone();
-        let sum_of = |celsius: Celsius| {
-            let ratio = thermistor.adc_ratio(celsius).clamp(0.0, 1.0);
-            ratio * board.adc_max * f64::from(SAMPLE_COUNT)
-        };
-        // A thermistor's resistance falls as it gets warmer.
-        let (cold, hot) = (sum_of(config.min_temp), sum_of(config.max_temp));
+    fn start(
+        name: HeaterName,
+        config: &HeaterConfig,
+        oids: HeaterOids,
+        board: &mut Board,
+        now: Seconds,
+    ) -> Self {
+        let thermistor = config.thermistor;
+        let samples = u32::from(SAMPLE_COUNT);
+        let (min_value, max_value) =
+            thermistor.adc_range(config.min_temp, config.max_temp, board.adc_max as u32, samples);
         let clock = board.clock_at(now) + board.ticks(FIRST_REPORT);
         let command = Command::QueryAnalogIn {
             oid: oids.sensor.0,
@@ -195,8 +212,8 @@ impl Channel {
             sample_count: SAMPLE_COUNT,
             rest_ticks: board.ticks(REPORT_INTERVAL).0 as u32,
             bytes_per_report: 2,
-            min_value: libm::floor(cold.min(hot)) as u16,
-            max_value: libm::ceil(cold.max(hot)) as u16,
+            min_value,
+            max_value,
             range_check_count: RANGE_CHECKS,
         };
         board.control(&command);
@@ -220,8 +237,11 @@ impl Channel {
         let clock = board.output_clock(now).max(Ticks(self.last_update.0 + u64::from(output.cycle_ticks)));
         self.last_update = clock;
         self.powered = duty > 0.0;
-        let command =
-            Command::QueueDigitalOut { oid: output.oid.0, clock: clock.low().0, on_ticks: output.on_ticks(duty) };
+        let command = Command::QueueDigitalOut {
+            oid: output.oid.0,
+            clock: clock.low().0,
+            on_ticks: output.on_ticks(duty),
+        };
         board.control_at(&command, clock);
     }
 }

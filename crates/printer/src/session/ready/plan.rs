@@ -1,0 +1,160 @@
+//! From the planner to the board: items of the plan, one after the other, as far ahead as the stream wants them.
+
+use gcode::{Heater as HeaterName, Severity};
+use units::Seconds;
+
+use super::{Failure, Ready, Wait};
+use crate::{
+    error::{ErrorCode, PrinterError},
+    planner::{ExtrusionPermit, Planned, TimedAction},
+    session::{
+        event::{Event, ScheduledMove},
+        job::JobState,
+        stream::Due,
+    },
+};
+
+/// The most items of the plan that are handled in one go, so that one call stays short.
+const PLAN_ITEMS_MAX: usize = 4096;
+
+impl Ready {
+    /// Takes from the planner what is to be sent.
+    pub(super) fn pump(&mut self, now: Seconds) -> Result<(), Failure> {
+        self.planner.guard.extrusion = self.extrusion_permit();
+        for _ in 0..PLAN_ITEMS_MAX {
+            let clock_now = self.board.clock_at(now);
+            if !self.stream.wants_more(self.planner.generated_until(), clock_now, &self.board) {
+                return Ok(());
+            }
+            // A run that has been planned is first made to its end.
+            let run_planned = self.planner.is_at_rest() && self.stream.run().is_some();
+            let homing = matches!(self.wait, Wait::Homing { .. });
+            if run_planned || !(homing || matches!(self.wait, Wait::Nothing)) {
+                return Ok(());
+            }
+            let stopping = self.job.as_ref().is_some_and(|job| {
+                matches!(job.state, JobState::Pausing | JobState::Cancelling | JobState::Failing(_))
+            });
+            if stopping {
+                self.planner.finish_run();
+            }
+            let source = match &mut self.job {
+                _ if homing || stopping => &mut self.silence,
+                Some(job) if job.state != JobState::Paused => &mut job.source,
+                _ => &mut self.console,
+            };
+            let planned = match self.planner.next(source) {
+                Ok(planned) => planned,
+                Err(error) => {
+                    self.source_failed(error, now);
+                    continue;
+                }
+            };
+            if !self.take(planned, now)? {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    fn extrusion_permit(&self) -> ExtrusionPermit {
+        match self.thermal.heater(HeaterName::Tool(0)) {
+            Some(heater) if !heater.can_extrude() => {
+                ExtrusionPermit::TooCold { celsius: heater.temperature().unwrap_or_default().0 }
+            }
+            _ => ExtrusionPermit::Allowed,
+        }
+    }
+
+    /// Handles one item of the plan; `false` when there is nothing more for now.
+    pub(super) fn take(&mut self, planned: Planned, now: Seconds) -> Result<bool, Failure> {
+        self.last_active = now;
+        match planned {
+            Planned::RunStarted(position) => {
+                let homing = matches!(self.wait, Wait::Homing { .. });
+                let run = self.stream.start_run(&self.board, now, homing);
+                if let Wait::Homing { axis, .. } = &mut self.wait {
+                    axis.run_started(run.start, &mut self.board, now);
+                }
+                self.events.push_back(Event::RunStarted { at: run.start, position });
+            }
+            Planned::Move(planned) => {
+                let Some(run) = self.stream.run() else { return Ok(true) };
+                let at = |time: f64| run.start + self.board.ticks(Seconds(time));
+                let scheduled = ScheduledMove {
+                    line: planned.tag,
+                    start: at(planned.start_time),
+                    end: at(planned.end_time()),
+                    from: planned.from,
+                    to: planned.to,
+                    homing: run.homing,
+                };
+                self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
+                self.events.push_back(Event::Move(scheduled));
+            }
+            Planned::Steps(command) => self.stream.push(&command, &mut self.board),
+            Planned::Timed { at, action, .. } => self.on_timed(at, action, now),
+            Planned::RunEnded(at) => {
+                if let Some(run) = self.stream.run() {
+                    let end = run.start + self.board.ticks(at);
+                    self.stream.end_run(end);
+                    if let Wait::Homing { axis, .. } = &mut self.wait {
+                        axis.run_planned(end);
+                    }
+                    self.events.push_back(Event::RunEnded { at: end });
+                }
+            }
+            Planned::Barrier { line, barrier } => return self.on_barrier(line, &barrier, now),
+            Planned::Notice(diagnostic) => self.on_notice(diagnostic, now),
+            Planned::NeedsInput => return Ok(self.on_drained(now)),
+            Planned::EndOfSource => {
+                self.job = None;
+                self.planner.adopt(&mut self.console);
+                self.events.push_back(Event::JobDone);
+            }
+        }
+        Ok(true)
+    }
+
+    pub(super) fn on_timed(&mut self, at: Seconds, action: TimedAction, now: Seconds) {
+        let Some(run) = self.stream.run() else {
+            self.act(action, now);
+            return;
+        };
+        let clock = run.start + self.board.ticks(at);
+        match action {
+            // The board itself does it at that clock.
+            TimedAction::Fan { speed, .. } => self.thermal.set_fan(speed, Some(clock), &mut self.board, now),
+            action => self.stream.schedule(clock, Due::Action(action)),
+        }
+    }
+
+    pub(super) fn on_notice(&mut self, diagnostic: gcode::Diagnostic, now: Seconds) {
+        let line = diagnostic.line.0;
+        let confirmed = self.job.as_ref().is_none_or(|job| job.is_confirmed(line));
+        let code = match diagnostic.severity {
+            Severity::Error => Some(ErrorCode::InvalidGcode),
+            Severity::Blocking if !confirmed || self.job.is_none() => Some(ErrorCode::UnknownCommand),
+            Severity::Blocking | Severity::Warning | Severity::Info => None,
+        };
+        match code {
+            Some(code) => self.source_failed(PrinterError::new(code, diagnostic.message).at_line(line), now),
+            None => self.events.push_back(Event::Notice(diagnostic)),
+        }
+    }
+
+    /// The source has nothing more at hand; `true` when the planner should be asked again all the same.
+    pub(super) fn on_drained(&mut self, now: Seconds) -> bool {
+        let clock_now = self.board.clock_at(now);
+        let printing = self.job.as_ref().is_some_and(|job| job.state == JobState::Printing);
+        let homing = matches!(self.wait, Wait::Homing { .. });
+        let planned_until = self.planner.planned_until();
+        if self.planner.is_at_rest()
+            || printing && !homing && !self.stream.is_starving(planned_until, clock_now, &self.board)
+        {
+            return false;
+        }
+        self.planner.finish_run();
+        true
+    }
+}
