@@ -243,7 +243,7 @@ impl Link {
     /// board's clock as far as it is known.
     pub fn poll(&mut self, now: Seconds, clock_now: Ticks, out: &mut Vec<u8>) -> Option<Seconds> {
         let before = out.len();
-        let wake = if self.window.is_adopted() || self.window.adopt(now.0) {
+        let wake = if self.window.is_adopted() {
             if let Some(resent) = self.window.resend(now.0, out) {
                 self.stats.retransmissions += 1;
                 self.stats.timeouts += u64::from(resent.timed_out);

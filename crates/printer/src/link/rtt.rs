@@ -10,8 +10,11 @@ use super::WINDOW_BLOCKS_MAX;
 pub(super) const RTO_S_MIN: f64 = 0.025;
 /// The longest, in seconds.
 pub(super) const RTO_S_MAX: f64 = 5.0;
-/// Doublings beyond this exceed [`RTO_S_MAX`] anyway.
-const BACKOFF_MAX: u32 = 8;
+/// Doubling ends here, in seconds: nobody else waits for the line to a board, so there is nothing to be gained by
+/// holding back further, and on a line that garbles nearly everything each attempt counts.
+const RTO_S_DOUBLED_MAX: f64 = 0.5;
+/// Doublings beyond this exceed [`RTO_S_DOUBLED_MAX`] anyway.
+const BACKOFF_MAX: u32 = 5;
 
 /// Round-trip times and the time-out that follows from them.
 #[derive(Clone, Debug)]
@@ -69,8 +72,9 @@ impl RoundTrip {
 
     /// The retransmission time-out now, in seconds.
     pub(super) fn timeout_s(&self) -> f64 {
-        let doubled = self.answer_s_max().max(RTO_S_MIN) * f64::from(1_u32 << self.backoff);
-        doubled.min(RTO_S_MAX)
+        let single = self.answer_s_max().clamp(RTO_S_MIN, RTO_S_MAX);
+        let doubled = single * f64::from(1_u32 << self.backoff);
+        doubled.min(RTO_S_DOUBLED_MAX).max(single)
     }
 
     /// No answer comes sooner than this after what caused it, in seconds.
@@ -150,16 +154,24 @@ mod tests {
     fn the_time_out_follows_the_standard() {
         let mut round_trip = RoundTrip::new();
         assert_eq!(round_trip.timeout_s(), RTO_S_MIN);
-        round_trip.sample(0.1);
-        assert!((round_trip.timeout_s() - 0.3).abs() < 1e-12);
+        round_trip.sample(0.02);
+        assert!((round_trip.timeout_s() - 0.06).abs() < 1e-12);
         round_trip.timed_out();
-        assert!((round_trip.timeout_s() - 0.6).abs() < 1e-12);
-        for _ in 0..20 {
-            round_trip.timed_out();
-        }
+        assert!((round_trip.timeout_s() - 0.12).abs() < 1e-12);
+        round_trip.sample(0.02);
+        assert!((round_trip.timeout_s() - 0.05).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_time_out_has_bounds() {
+        let mut round_trip = RoundTrip::new();
+        (0..40).for_each(|_| round_trip.timed_out());
+        assert_eq!(round_trip.timeout_s(), RTO_S_DOUBLED_MAX);
+        round_trip.sample(1e-6);
+        assert_eq!(round_trip.timeout_s(), RTO_S_MIN);
+        round_trip.sample(1e6);
+        (0..40).for_each(|_| round_trip.timed_out());
         assert_eq!(round_trip.timeout_s(), RTO_S_MAX);
-        round_trip.sample(0.1);
-        assert!((round_trip.timeout_s() - 0.25).abs() < 1e-12);
     }
 
     #[test]
@@ -188,10 +200,9 @@ mod tests {
                 round_trip.timed_out();
                 times += 1;
             }
-            if times == 0 {
-                round_trip.sample(0.1)
-            } else {
-                round_trip.bound(0.1 - sent_s)
+            match times {
+                0 => round_trip.sample(0.1),
+                _ => round_trip.bound(0.1 - sent_s),
             }
             *resent = times;
         }

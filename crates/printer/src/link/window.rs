@@ -83,10 +83,8 @@ pub(super) struct Window {
     adopted: bool,
     probes: u32,
     probe_s: f64,
-    /// The number that the board gave last, and when, while it is not settled yet.
-    candidate: Option<(u8, f64)>,
-    /// How often it gave one.
-    candidates: u32,
+    /// The number that the board gave, while it is not settled.
+    candidate: Option<u8>,
     /// The number that the board expects, in full: that of the front of `sent`.
     expected: u64,
     sent: VecDeque<Sent>,
@@ -121,7 +119,6 @@ impl Window {
             probes: 0,
             probe_s: 0.0,
             candidate: None,
-            candidates: 0,
             expected: 0,
             sent: VecDeque::with_capacity(SEQUENCES as usize),
             sent_bytes: 0,
@@ -166,35 +163,52 @@ impl Window {
         self.sent.iter().filter_map(|sent| sent.motion.due).min()
     }
 
-    /// Asks the board for its number with an empty block. It is answered with the number that the board expects
-    /// next whether it is taken or refused, and nothing is lost either way. Returns its length.
-    pub(super) fn probe(&mut self, now_s: f64, out: &mut Vec<u8>) -> usize {
-        // The numbers of successive probes lie far apart: a late answer to one cannot be taken for a later one's.
+    /// Asks the board for its number with an empty block, which tells it by an answer whether it is taken or refused.
+    ///
+    /// One answer is not enough. A probe may be refused together with noise before it and be taken nevertheless: two
+    /// answers with different numbers. So the number that was given is probed too. If the board is still there, it
+    /// takes that block; if it was already one further, it refuses it: either way it is one further then, and says so.
+    pub(super) fn probe(&mut self, now_s: f64, out: &mut Vec<u8>) {
+        // The numbers of successive probes lie far apart, so that the board does not take two in a row.
         const STRIDE: u32 = 7;
-        let sequence = (1 + self.probes * STRIDE) as u8 & SEQUENCE_MASK;
-        let block = Block::new(sequence, &[]);
+        let sequence = self.candidate.unwrap_or(self.probes.wrapping_mul(STRIDE) as u8);
         out.push(SYNC);
-        out.extend_from_slice(block.as_bytes());
+        out.extend_from_slice(Block::new(sequence, &[]).as_bytes());
         if self.probes > 0 {
             self.round_trip.timed_out();
         }
         self.probes = self.probes.wrapping_add(1);
         self.probe_s = now_s;
-        1 + block.as_bytes().len()
     }
 
-    /// When the number is settled, or else when to ask (again).
-    ///
-    /// A probe may be answered twice, by a refusal of noise before it and by its own acknowledgement with another
-    /// number, and late answers to earlier probes may follow. The last one counts.
+    /// When to probe (again).
     pub(super) fn probe_due_s(&self) -> f64 {
-        const QUIET_S_MIN: f64 = 0.01;
-        const QUIET_S_MAX: f64 = 0.25;
+        if self.probes == 0 { f64::NEG_INFINITY } else { self.probe_s + self.round_trip.timeout_s() }
+    }
+
+    /// Takes the answer to a probe.
+    fn probed(&mut self, sequence: u8, now_s: f64) {
+        let next = |candidate: u8| (candidate + 1) & SEQUENCE_MASK;
         match self.candidate {
-            Some((_, at_s)) => at_s + (at_s - self.probe_s).clamp(QUIET_S_MIN, QUIET_S_MAX),
-            None if self.probes == 0 => f64::NEG_INFINITY,
-            None => self.probe_s + self.round_trip.timeout_s(),
+            Some(candidate) if sequence == next(candidate) => self.adopt(sequence, now_s),
+            Some(candidate) if sequence == candidate => {}
+            _ => {
+                // The next probe belongs to this number, and goes at once.
+                self.candidate = Some(sequence);
+                self.probes = 0;
+            }
         }
+    }
+
+    fn adopt(&mut self, sequence: u8, now_s: f64) {
+        if self.probes == 1 {
+            self.round_trip.sample(now_s - self.probe_s);
+        }
+        self.adopted = true;
+        // Numbers start a whole turn above zero, so that there is always one before.
+        self.expected = SEQUENCES + u64::from(sequence);
+        self.last_answer = self.expected;
+        self.resent_below = self.expected;
     }
 
     /// Frames and sends a payload. Returns its length.
@@ -273,8 +287,7 @@ impl Window {
     pub(super) fn answer(&mut self, sequence: u8, empty: bool, now_s: f64) -> Verdict {
         if !self.adopted {
             if empty && self.probes > 0 {
-                self.candidate = Some((sequence, now_s));
-                self.candidates = self.candidates.saturating_add(1);
+                self.probed(sequence, now_s);
             }
             return Verdict::default();
         }
@@ -290,22 +303,6 @@ impl Window {
             self.judge(number, now_s);
         }
         Verdict { sent_s: self.latest(number - 1).sent_s, absurd: false }
-    }
-
-    /// Takes the number that the board gave, if it is settled.
-    pub(super) fn adopt(&mut self, now_s: f64) -> bool {
-        let Some((sequence, at_s)) = self.candidate.filter(|_| now_s >= self.probe_due_s()) else {
-            return false;
-        };
-        if self.probes == 1 && self.candidates == 1 {
-            self.round_trip.sample(at_s - self.probe_s);
-        }
-        self.adopted = true;
-        // Numbers start a whole turn above zero, so that there is always one before.
-        self.expected = SEQUENCES + u64::from(sequence);
-        self.last_answer = self.expected;
-        self.resent_below = self.expected;
-        true
     }
 
     fn acknowledge(&mut self, count: usize, now_s: f64) {
