@@ -14,8 +14,11 @@ use serde::Deserialize;
 use crate::callgrind::{self, SelfCosts};
 use crate::workspace;
 
-/// Source files shown below their stage when they take at least this share of the whole.
-const SHARE_SHOWN_MIN: f64 = 0.01;
+/// Source files are shown below their stage when they take at least this share of the whole.
+const FILE_SHARE_MIN: f64 = 0.01;
+
+/// Stages below this share of the whole are shown as one.
+const STAGE_SHARE_MIN: f64 = 0.001;
 
 /// The part of `stepcast plan --json` that this needs.
 #[derive(Deserialize)]
@@ -54,7 +57,8 @@ pub(crate) fn motion(file: Option<PathBuf>, config: Option<PathBuf>) -> Result<(
     if !output.status.success() {
         bail!("stepcast plan failed under valgrind:\n{}", String::from_utf8_lossy(&output.stderr));
     }
-    let plan: Plan = serde_json::from_slice(&output.stdout).context("stepcast plan --json wrote something else")?;
+    let plan: Plan =
+        serde_json::from_slice(&output.stdout).context("stepcast plan --json wrote something else")?;
     let costs = callgrind::self_costs(&fs::read_to_string(&profile).context("valgrind wrote no profile")?)?;
     report(&file, &plan, &costs);
     Ok(())
@@ -70,19 +74,28 @@ fn report(file: &Path, plan: &Plan, costs: &SelfCosts) {
         entry.0 += *cost as f64;
         *entry.1.entry(module).or_default() += *cost as f64;
     }
-    println!("{}: {} moves, {steps} steps, {:.3} bytes a step", file.display(), plan.moves, plan.bytes_per_step);
+    println!(
+        "{}: {} moves, {steps} steps, {:.3} bytes a step",
+        file.display(),
+        plan.moves,
+        plan.bytes_per_step
+    );
     println!("{:<44}{:>14}{:>10}", "", "instructions", "a step");
     println!("{:<44}{total:>14}{:>10.1}", "whole path", total / steps);
     let mut order: Vec<_> = stages.into_iter().collect();
     order.sort_by(|(_, a), (_, b)| b.0.total_cmp(&a.0));
+    let shown = order.iter().take_while(|(_, (cost, _))| *cost >= STAGE_SHARE_MIN * total).count();
+    let rest: f64 = order.drain(shown..).map(|(_, (cost, _))| cost).sum();
     for (stage, (cost, modules)) in order {
         println!("  {stage:<42}{cost:>14}{:>10.1}", cost / steps);
-        let mut modules: Vec<_> = modules.into_iter().filter(|(_, cost)| *cost >= SHARE_SHOWN_MIN * total).collect();
+        let mut modules: Vec<_> =
+            modules.into_iter().filter(|(_, cost)| *cost >= FILE_SHARE_MIN * total).collect();
         modules.sort_by(|(_, a), (_, b)| b.total_cmp(a));
         for (module, cost) in modules.into_iter().filter(|(module, _)| *module != stage) {
             println!("    {module:<40}{cost:>14}{:>10.1}", cost / steps);
         }
     }
+    println!("  {:<42}{rest:>14}{:>10.1}", "the rest", rest / steps);
 }
 
 /// The stage (a crate of ours, or the library) and the module that an instruction belongs to.
@@ -101,10 +114,12 @@ fn place(source: &str, function: &str) -> (String, String) {
         }
     }
     // The standard library, inlined into or instantiated for one of our functions.
-    let owner = function.trim_start_matches(['<', '&', '*']).split("::").next().unwrap_or_default();
+    let mut owner = function.trim_start_matches(['<', '&', '*']).split("::");
+    let krate = owner.next().unwrap_or_default();
     let ours = ["gcode", "motion", "steps", "printer", "wire", "stepcast", "units"];
-    if let Some(name) = ours.iter().find(|name| **name == owner) {
-        return ((*name).to_owned(), format!("{name}: standard library"));
+    if ours.contains(&krate) {
+        let module = owner.next().unwrap_or_default();
+        return (krate.to_owned(), format!("{krate}: standard library in {module}"));
     }
     ("libraries".to_owned(), "libraries".to_owned())
 }

@@ -30,7 +30,13 @@ const LAYERS: &[Layer] = &[
     Layer { name: "units", folder: "crates/units", may_use: &[], tests_may_use: &[], pure: true },
     Layer { name: "wire", folder: "crates/wire", may_use: &["units"], tests_may_use: &[], pure: true },
     Layer { name: "gcode", folder: "crates/gcode", may_use: &["units"], tests_may_use: &[], pure: true },
-    Layer { name: "motion", folder: "crates/motion", may_use: &["units", "gcode"], tests_may_use: &[], pure: true },
+    Layer {
+        name: "motion",
+        folder: "crates/motion",
+        may_use: &["units", "gcode"],
+        tests_may_use: &[],
+        pure: true,
+    },
     Layer {
         name: "steps",
         folder: "crates/steps",
@@ -69,7 +75,16 @@ const LAYERS: &[Layer] = &[
     Layer {
         name: "stepcast",
         folder: "crates/stepcast",
-        may_use: &["units", "wire", "gcode", "motion", "steps", "printer", "firmware-core", "virtual-printer"],
+        may_use: &[
+            "units",
+            "wire",
+            "gcode",
+            "motion",
+            "steps",
+            "printer",
+            "firmware-core",
+            "virtual-printer",
+        ],
         tests_may_use: &[],
         pure: false,
     },
@@ -85,8 +100,8 @@ pub(crate) fn run() -> Result<()> {
         findings.extend(sources::impurities(&workspace::root().join(layer.folder).join("src"))?);
     }
     let architecture = workspace::root().join("ARCHITECTURE.md");
-    let text =
-        fs::read_to_string(&architecture).with_context(|| format!("cannot read {}", architecture.display()))?;
+    let text = fs::read_to_string(&architecture)
+        .with_context(|| format!("cannot read {}", architecture.display()))?;
     let paths = paths_named(&text);
     for path in &paths {
         if !workspace::root().join(path).exists() {
@@ -94,7 +109,11 @@ pub(crate) fn run() -> Result<()> {
         }
     }
     if findings.is_empty() {
-        println!("{} crates keep to their layers; {} paths of ARCHITECTURE.md exist", packages.len(), paths.len());
+        println!(
+            "{} crates keep to their layers; {} paths of ARCHITECTURE.md exist",
+            packages.len(),
+            paths.len()
+        );
         return Ok(());
     }
     for finding in &findings {
@@ -114,7 +133,8 @@ fn check(packages: &[Package]) -> Vec<String> {
             continue;
         };
         if layer.folder != package.folder {
-            findings.push(format!("{}: lies in {}, its row says {}", package.name, package.folder, layer.folder));
+            findings
+                .push(format!("{}: lies in {}, its row says {}", package.name, package.folder, layer.folder));
         }
         for used in package.uses.iter().filter(|used| !layer.may_use.contains(&used.as_str())) {
             findings.push(format!("{}: uses {used}, may use {}", package.name, layer.may_use.join(", ")));

@@ -53,7 +53,9 @@ fn rust_files(folder: &Path) -> Result<Vec<PathBuf>> {
 
 /// A file of tests only, by its name.
 fn is_test(path: &Path) -> bool {
-    path.file_stem().and_then(|stem| stem.to_str()).is_some_and(|stem| stem == "tests" || stem.ends_with("_tests"))
+    path.file_stem()
+        .and_then(|stem| stem.to_str())
+        .is_some_and(|stem| stem == "tests" || stem.ends_with("_tests"))
 }
 
 /// Line number and word of each hit, up to the tests at the file's end; comments do not count.
@@ -75,7 +77,8 @@ mod tests {
 
     #[test]
     fn finds_clocks_and_files_but_not_in_comments_or_tests() {
-        let text = "use std::fs;\n// std::net\nlet t = Instant::now();\n#[cfg(test)]\nmod tests { use std::io; }";
+        let text =
+            "use std::fs;\n// std::net\nlet t = Instant::now();\n#[cfg(test)]\nmod tests { use std::io; }";
         assert_eq!(forbidden_words(text), [(1, "std::fs"), (3, "Instant::now")]);
     }
 }

@@ -24,7 +24,14 @@ pub(crate) fn run() -> Result<()> {
     let output = target.join(BINDINGS_FOLDER);
     workspace::run(
         workspace::cargo()
-            .args(["run", "--package=xtask", "--features=wasm", "--bin=xtask-wasm-bindgen", "--profile=tools", "--"])
+            .args([
+                "run",
+                "--package=xtask",
+                "--features=wasm",
+                "--bin=xtask-wasm-bindgen",
+                "--profile=tools",
+                "--",
+            ])
             .args([&module, &output]),
     )?;
     println!("{}", output.display());

@@ -90,15 +90,18 @@ fn describe(package: &MetadataPackage, root: &Path) -> Package {
     let folder = package.manifest_path.parent().unwrap_or(root);
     let folder = folder.strip_prefix(root).unwrap_or(folder);
     let ours = |dev: bool| {
-        let of_kind = package
-            .dependencies
-            .iter()
-            .filter(move |dependency| dependency.path.is_some() && (dependency.kind.as_deref() == Some("dev")) == dev);
+        let of_kind = package.dependencies.iter().filter(move |dependency| {
+            dependency.path.is_some() && (dependency.kind.as_deref() == Some("dev")) == dev
+        });
         of_kind.map(|dependency| dependency.name.clone()).collect()
     };
     Package {
         name: package.name.clone(),
-        folder: folder.components().map(|part| part.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/"),
+        folder: folder
+            .components()
+            .map(|part| part.as_os_str().to_string_lossy())
+            .collect::<Vec<_>>()
+            .join("/"),
         uses: ours(false),
         tests_use: ours(true),
     }
