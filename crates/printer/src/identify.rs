@@ -152,3 +152,90 @@ impl Identify {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_pcg::{Pcg32, rand_core::Rng};
+    use wire::dictionary::{Constant, Description};
+
+    use super::*;
+
+    fn description() -> Description {
+        let text = |name: &str, value: &str| (name.to_owned(), Constant::Text(value.to_owned()));
+        Description {
+            version: "1.0".to_owned(),
+            build_versions: "rustc".to_owned(),
+            constants: vec![("CLOCK_FREQ".to_owned(), Constant::Number(12e6)), text("MCU", "rp2040")],
+            pins: vec![("gpio0".to_owned(), 0, 30)],
+        }
+    }
+
+    /// Reads `data` from a board of which every answer gets lost with some probability; gives the time it took.
+    fn read(identify: &mut Identify, data: &[u8], loss: f64) -> Result<(Dictionary, f64), IdentifyError> {
+        let mut chance = Pcg32::new(7, 7);
+        let mut now = Seconds(1.0);
+        loop {
+            now = now.max(identify.next_wake().expect("not finished"));
+            let Some(request) = identify.poll(now)? else { continue };
+            if f64::from(chance.next_u32()) < loss * f64::from(u32::MAX) {
+                continue;
+            }
+            now += Seconds(0.003);
+            let start = data.len().min(request.offset as usize);
+            let end = data.len().min(start + usize::from(request.count));
+            if let Some(dictionary) = identify.receive(request.offset, &data[start..end], now)? {
+                return Ok((dictionary, now.0 - 1.0));
+            }
+        }
+    }
+
+    #[test]
+    fn the_dictionary_is_read_whole() {
+        let data = description().compressed();
+        let mut identify = Identify::new();
+        let (dictionary, took_s) = read(&mut identify, &data, 0.0).unwrap();
+        assert_eq!(dictionary.text("MCU").as_deref(), Some("rp2040"));
+        assert_eq!(identify.bytes_read(), data.len());
+        assert_eq!(identify.next_wake(), None);
+        assert!(took_s < 0.004 * (data.len() / 40 + 2) as f64, "{took_s} s");
+    }
+
+    #[test]
+    fn lost_answers_are_asked_for_again_soon() {
+        let data = description().compressed();
+        let (_, took_s) = read(&mut Identify::new(), &data, 0.4).unwrap();
+        assert!(took_s < 0.1 * (data.len() / 40 + 2) as f64, "{took_s} s for {} bytes", data.len());
+    }
+
+    #[test]
+    fn a_silent_board_is_an_error() {
+        assert_eq!(read(&mut Identify::new(), &[], 1.1).unwrap_err(), IdentifyError::Silent);
+    }
+
+    #[test]
+    fn answers_that_were_not_asked_for_are_ignored() {
+        let mut identify = Identify::new();
+        assert!(identify.receive(0, b"old", Seconds(0.0)).unwrap().is_none());
+        identify.poll(Seconds(0.0)).unwrap();
+        assert!(identify.receive(40, b"other", Seconds(0.0)).unwrap().is_none());
+        assert!(identify.receive(0, &[0; 41], Seconds(0.0)).unwrap().is_none());
+        assert_eq!(identify.bytes_read(), 0);
+        identify.receive(0, b"first", Seconds(0.0)).unwrap();
+        identify.receive(0, b"again", Seconds(0.0)).unwrap();
+        assert_eq!(identify.bytes_read(), 5);
+    }
+
+    #[test]
+    fn damage_is_read_again_and_then_is_an_error() {
+        let mut data = description().compressed();
+        data[60] ^= 1;
+        let error = read(&mut Identify::new(), &data, 0.0).unwrap_err();
+        assert!(matches!(error, IdentifyError::Dictionary(_)), "{error}");
+    }
+
+    #[test]
+    fn a_dictionary_without_end_is_an_error() {
+        let data = vec![0; COMPRESSED_BYTES_MAX + 100];
+        assert_eq!(read(&mut Identify::new(), &data, 0.0).unwrap_err(), IdentifyError::TooLarge);
+    }
+}
