@@ -2,7 +2,8 @@
 //!
 //! A step's rising edge comes at its clock; the falling edge is a timer of its own `pulse_ticks` later, so that
 //! nothing ever waits. The pin then stays low for as long again before the next edge, which is also what a change of
-//! direction is given to settle: the direction changes when the last pulse of the old one has ended.
+//! direction is given to settle: the direction changes `pulse_ticks` before the first step of the new one (or when the
+//! last pulse ends, where that is later). So the edges depend on the plan alone, not on when its rows arrived.
 //!
 //! Steps are due on the clock that the host plans with, pulses are as long as the driver's data sheet wants: where the
 //! two clocks differ (a motion clock that slows down), `step_clock` is of the first and the rest of the second.
@@ -23,6 +24,8 @@ pub(crate) struct Stepper {
     pulse_ticks: u32,
     /// A pulse has begun and not ended.
     in_pulse: bool,
+    /// The direction has to change before the next step.
+    turning: bool,
     /// The level of the direction pin; high counts the position up.
     forward: bool,
     /// The direction of moves that are yet to come from the host.
@@ -56,6 +59,7 @@ impl Stepper {
             inverted,
             pulse_ticks,
             in_pulse: false,
+            turning: false,
             forward: false,
             next_forward: false,
             step_clock: Clock32(0),
@@ -79,6 +83,9 @@ impl Stepper {
         late_ticks: u32,
     ) -> Result<Option<Clock32>, ShutdownReason> {
         if !self.in_pulse {
+            if self.turning {
+                return Ok(Some(self.turn(board)));
+            }
             board.set_pin(self.step_pin, !self.inverted);
             self.in_pulse = true;
             self.position = self.position.wrapping_add(i32::from(self.forward) * 2 - 1);
@@ -90,8 +97,10 @@ impl Stepper {
         if self.left != 0 {
             self.interval = self.interval.wrapping_add_signed(i32::from(self.add));
             self.step_clock = self.step_clock.wrapping_add(self.interval);
-        } else if !self.load(board, moves) {
+        } else if !self.load(moves) {
             return Ok(None);
+        } else if let Some(wake) = self.start_turning(board) {
+            return Ok(Some(wake));
         }
         let earliest = board.now().wrapping_add(self.pulse_ticks);
         let ahead = self.step_clock.since(earliest);
@@ -106,17 +115,38 @@ impl Stepper {
 
     /// Takes the next row off the queue; `false` when there is none.
     #[inline(never)]
-    fn load<const M: usize>(&mut self, board: &mut impl Board, moves: &mut MovePool<M>) -> bool {
+    fn load<const M: usize>(&mut self, moves: &mut MovePool<M>) -> bool {
         let Some(row) = moves.pop::<StepMove>(&mut self.queue) else { return false };
         self.interval = row.interval;
         self.add = row.add;
         self.left = row.count;
         self.step_clock = self.step_clock.wrapping_add(row.interval);
-        if row.forward != self.forward {
-            self.forward = row.forward;
-            board.set_pin(self.dir_pin, row.forward);
-        }
+        self.turning = row.forward != self.forward;
         true
+    }
+
+    /// When to turn, if the row that was just loaded needs it and it is not time yet; where it is, turns at once.
+    #[inline(never)]
+    fn start_turning(&mut self, board: &mut impl Board) -> Option<Clock32> {
+        if !self.turning {
+            return None;
+        }
+        let at = self.step_clock.wrapping_add(self.pulse_ticks.wrapping_neg());
+        if at.since(board.now()) > 0 {
+            return Some(at);
+        }
+        self.turn(board);
+        None
+    }
+
+    /// Changes the direction; the earliest clock of the step that follows.
+    #[inline(never)]
+    fn turn(&mut self, board: &mut impl Board) -> Clock32 {
+        self.turning = false;
+        self.forward = !self.forward;
+        board.set_pin(self.dir_pin, self.forward);
+        let earliest = board.now().wrapping_add(self.pulse_ticks);
+        if self.step_clock.is_before(earliest) { earliest } else { self.step_clock }
     }
 
     /// Queues a row; the clock at which to wake when the stepper was idle.
@@ -137,10 +167,13 @@ impl Stepper {
         if is_busy {
             return Ok(None);
         }
-        self.load(board, moves);
+        self.load(moves);
         let now = board.now();
         if self.step_clock.is_before(now) {
             return Err(ShutdownReason::TimerTooClose);
+        }
+        if let Some(wake) = self.start_turning(board) {
+            return Ok(Some(wake));
         }
         // The direction may have changed just now, or the last pulse ended just now.
         let earliest = now.wrapping_add(self.pulse_ticks);
@@ -169,6 +202,7 @@ impl Stepper {
     pub(crate) fn stop<const M: usize>(&mut self, moves: &mut MovePool<M>) -> bool {
         moves.clear(&mut self.queue);
         self.left = 0;
+        self.turning = false;
         self.stopped = true;
         self.stop_on = None;
         !self.in_pulse
@@ -178,6 +212,7 @@ impl Stepper {
     pub(crate) fn shut_down(&mut self, board: &mut impl Board) {
         board.set_pin(self.step_pin, self.inverted);
         self.in_pulse = false;
+        self.turning = false;
         self.queue = Queue::new();
         self.left = 0;
         self.stopped = true;

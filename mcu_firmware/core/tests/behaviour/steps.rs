@@ -65,10 +65,26 @@ fn the_direction_changes_between_the_pulses_with_time_to_settle() {
         steps(0, 1000, 1, 0),
     ]);
     bench.run_for(SECOND);
-    assert_eq!(bench.edges_of(DIR_PIN, true), [0]);
-    assert_eq!(bench.edges_of(DIR_PIN, false), [2000 + PULSE_TICKS]);
+    assert_eq!(bench.edges_of(DIR_PIN, true), [1000 - PULSE_TICKS], "as late as it may be");
+    assert_eq!(bench.edges_of(DIR_PIN, false), [2000 + PULSE_TICKS], "when the last pulse has ended");
     assert_eq!(bench.edges_of(STEP_PIN, true), [1000, 2000, 2000 + 2 * PULSE_TICKS, 3010]);
     assert_eq!(bench.position(0), 0);
+}
+
+#[test]
+fn when_rows_arrive_changes_no_edge() {
+    let edges = |arrival: u64| {
+        let mut bench = bench_at(0);
+        bench.send_all(&[Command::SetNextStepDir { oid: 0, dir: 1 }, steps(0, 1000, 2, 0)]);
+        bench.run_for(arrival);
+        bench.send_all(&[Command::SetNextStepDir { oid: 0, dir: 0 }, steps(0, 5000, 3, -7)]);
+        bench.run_for(SECOND);
+        [STEP_PIN, DIR_PIN].map(|pin| [true, false].map(|level| bench.edges_of(pin, level)))
+    };
+    let at_once = edges(0);
+    for arrival in [500, 1000, 1500, 2000, 2500, 4000, 6500] {
+        assert_eq!(edges(arrival), at_once, "the second row arrives at {arrival}");
+    }
 }
 
 #[test]
