@@ -34,7 +34,7 @@ pub(super) fn receive(link: &mut Link, dictionary: &Dictionary, bytes: &[u8], no
         while !rest.is_empty() {
             match dictionary.decode(&mut rest) {
                 Ok(Received::Known(response)) => {
-                    inbox.extend(message(&response).map(|known| (known, payload.sent)))
+                    inbox.extend(message(&response).map(|known| (known, payload.sent)));
                 }
                 Ok(Received::Other(_)) => {}
                 Err(_) => break,
