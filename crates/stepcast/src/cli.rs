@@ -90,7 +90,7 @@ pub(crate) struct MachineArgs {
     /// What all chance follows from: the same seed gives the same run
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
-    #[doc = "Something that goes wrong; may be given several times"]
+    /// Something that goes wrong; may be given several times
     #[arg(long = "fault", value_name = "FAULT", long_help = fault_help())]
     pub(crate) faults: Vec<Faults>,
 }

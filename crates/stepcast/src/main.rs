@@ -31,7 +31,9 @@ fn main() -> ExitCode {
         let report = console::ErrorReport::from(&error);
         if json {
             // The keys of a result are not there: this one says why.
-            let _ = console::print_json(&serde_json::json!({ "result": "failed", "error": &report }));
+            let why =
+                serde_json::json!({ "result": "failed", "reason": &report.what_happened, "error": &report });
+            let _ = console::print_json(&why);
         }
         console::show_error(&report);
         ExitCode::FAILURE

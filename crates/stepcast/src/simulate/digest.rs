@@ -30,7 +30,10 @@ enum Kind {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Motor {
+    /// Of its pulses.
     hash: u64,
+    /// Of the changes of its direction pin.
+    direction_hash: u64,
     /// A change of direction belongs to the run of the step that follows it.
     direction: Option<(Ticks, bool)>,
     /// The last step belongs to a run that counts.
@@ -67,7 +70,8 @@ impl Digest {
         state.in_run = self.base.is_some();
         let Some(base) = self.base else { return };
         if let Some((changed, forward)) = direction {
-            state.add(if forward { Kind::Forward } else { Kind::Backward }, changed.0.wrapping_sub(base));
+            let kind = if forward { Kind::Forward } else { Kind::Backward };
+            state.direction_hash = mix(state.direction_hash, changed.0.wrapping_sub(base) << 3 | kind as u64);
         }
         state.add(if forward { Kind::StepForward } else { Kind::StepBackward }, at.0.wrapping_sub(base));
     }
@@ -90,10 +94,20 @@ impl Digest {
         }
     }
 
-    /// The fingerprint, as 16 hexadecimal digits.
+    /// The fingerprint of all edges, as 16 hexadecimal digits.
     pub(crate) fn text(&self) -> String {
-        let all = self.motors.iter().fold(self.runs, |hash, motor| mix(hash, motor.hash));
+        let all = self.motors.iter().fold(self.step_hash(), |hash, motor| mix(hash, motor.direction_hash));
         format!("{all:016x}")
+    }
+
+    /// The same of the pulses alone, each with its direction: when the direction pin changed does not count, as long as it
+    /// was before the pulse.
+    pub(crate) fn step_text(&self) -> String {
+        format!("{:016x}", self.step_hash())
+    }
+
+    fn step_hash(&self) -> u64 {
+        self.motors.iter().fold(self.runs, |hash, motor| mix(hash, motor.hash))
     }
 
     #[cold]
@@ -171,8 +185,10 @@ mod tests {
             digest.direction(0, Ticks(changed), false);
             digest.expect_run(Ticks(100), false);
             digest.step(0, Ticks(110), false);
-            digest.text()
+            [digest.text(), digest.step_text()]
         };
-        assert_ne!(run(50), run(60));
+        let ([all, steps], [other, same]) = (run(50), run(60));
+        assert_ne!(all, other);
+        assert_eq!(steps, same);
     }
 }

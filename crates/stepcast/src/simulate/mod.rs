@@ -117,12 +117,12 @@ impl Refusal {
     }
 }
 
-/// An error of the simulation's own making, put as the catalogue does.
-fn own_error(detail: impl Into<String>) -> ErrorReport {
+/// What a simulation finds out that no printer could, put as the catalogue does.
+fn own_error(code: &'static str, what_happened: impl Into<String>) -> ErrorReport {
     ErrorReport {
-        code: "wrong-pulses",
+        code,
         line: None,
-        what_happened: detail.into(),
+        what_happened: what_happened.into(),
         what_is_safe: None,
         what_to_do: None,
     }

@@ -234,7 +234,7 @@ impl Observer {
         if let Some(error) = &self.error {
             return Some(error.into());
         }
-        (!self.done).then(|| super::own_error("the job was cancelled before its end"))
+        (!self.done).then(|| super::own_error("cancelled", "the job was cancelled before its end"))
     }
 }
 

@@ -55,6 +55,8 @@ pub(crate) struct Report {
     pub(crate) min_queued_s: Option<f64>,
     /// A fingerprint of every edge on the motors' pins but homing's.
     pub(crate) pulse_digest: String,
+    /// The same of the pulses with their directions, whenever the direction pins changed before them.
+    pub(crate) step_digest: String,
     pub(crate) homing: Vec<Homing>,
     pub(crate) pauses: u32,
     pub(crate) after: After,
@@ -163,6 +165,7 @@ mod tests {
             damaged_bytes: [1, 2],
             min_queued_s: Some(2.5),
             pulse_digest: "0123456789abcdef".to_owned(),
+            step_digest: "fedcba9876543210".to_owned(),
             homing: Vec::new(),
             pauses: 0,
             after: After::default(),

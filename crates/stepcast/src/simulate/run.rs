@@ -3,7 +3,7 @@
 //! The host's clock and the board's are not the same: the host's starts anywhere, and the board's crystal is a little off,
 //! so that the session has to find out both.
 
-use std::time::Instant;
+use std::{collections::BTreeMap, time::Instant};
 
 use printer::{
     config::PrinterConfig,
@@ -12,7 +12,7 @@ use printer::{
     session::{JobOptions, JobStatus, Request, Session},
 };
 use units::{Hertz, Seconds, Ticks};
-use virtual_printer::VirtualPrinter;
+use virtual_printer::{State, VirtualPrinter};
 
 use super::{
     observer::{Observer, Wish},
@@ -291,23 +291,11 @@ impl Simulation {
             motors_still: still,
             shutdown: state.shutdown.map(|reason| reason.text().to_owned()),
         };
-        let mut motors = std::collections::BTreeMap::new();
-        for (motor, &name) in MOTOR_NAMES.iter().enumerate() {
-            let lost_steps = state.motors.get(motor).map_or(0, |view| view.lost.0);
-            motors.insert(
-                name,
-                Motor {
-                    planned_steps: self.observer.planned[motor],
-                    counted_steps: tally.pulses[motor],
-                    lost_steps,
-                    end_position_mm: tally.path.position_mm(motor),
-                },
-            );
-        }
-        let error = self
-            .observer
-            .session_error()
-            .or_else(|| wrong(&self.observer, tally, &motors, self.path_error_max_mm).map(own_error));
+        let motors = motors(&self.observer, tally, &state);
+        let error = self.observer.session_error().or_else(|| {
+            wrong(&self.observer, tally, &motors, self.path_error_max_mm)
+                .map(|found| own_error("wrong-pulses", found))
+        });
         let worst = tally.path.worst();
         let stats = self.session.link_stats().unwrap_or_default();
         Report {
@@ -331,6 +319,7 @@ impl Simulation {
             damaged_bytes: state.damaged_bytes,
             min_queued_s: self.observer.min_queued.map(|ahead| ahead.0),
             pulse_digest: tally.digest.text(),
+            step_digest: tally.digest.step_text(),
             homing: std::mem::take(&mut self.observer.homing),
             pauses: self.observer.pauses,
             after: self.after,
@@ -339,11 +328,21 @@ impl Simulation {
     }
 }
 
+fn motors(observer: &Observer, tally: &Tally, state: &State) -> BTreeMap<&'static str, Motor> {
+    let of = |motor: usize| Motor {
+        planned_steps: observer.planned[motor],
+        counted_steps: tally.pulses[motor],
+        lost_steps: state.motors.get(motor).map_or(0, |view| view.lost.0),
+        end_position_mm: tally.path.position_mm(motor),
+    };
+    MOTOR_NAMES.iter().enumerate().map(|(motor, &name)| (name, of(motor))).collect()
+}
+
 /// What is wrong with the pulses of a print that the session takes for done.
 fn wrong(
     observer: &Observer,
     tally: &Tally,
-    motors: &std::collections::BTreeMap<&'static str, Motor>,
+    motors: &BTreeMap<&'static str, Motor>,
     path_error_max_mm: f64,
 ) -> Option<String> {
     if let Some(mismatch) = &observer.mismatch {

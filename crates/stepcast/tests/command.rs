@@ -1,0 +1,220 @@
+//! The command as users and scripts see it: exit statuses, JSON, texts.
+
+use std::{
+    fs,
+    path::PathBuf,
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+
+const MACHINE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../samples/printer.cfg");
+
+/// A small print: homing, heat, a square, a retraction, an arc.
+const PRINT: &str = "M104 S200\nG28\nM109 S200\nG90\nM82\nG92 E0\nG1 Z0.3 F600\nG1 X50 Y50 F9000\n\
+    G1 X60 Y50 E0.5 F1800\nG1 X60 Y60 E1.0\nG1 X50 Y60 E1.5\nG1 X50 Y50 E2.0\nG3 X60 Y60 I10 J0 E2.6\n\
+    G1 E1.6 F2400\nG1 X10 Y10 F12000\nM104 S0\nM84\n";
+
+struct File(PathBuf);
+
+impl File {
+    fn new(name: &str, content: impl AsRef<[u8]>) -> Self {
+        let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+        fs::write(&path, content).expect("a scratch file");
+        Self(path)
+    }
+}
+
+fn stepcast(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_stepcast")).args(arguments).output().expect("the command runs")
+}
+
+fn json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn simulate(file: &File, more: &[&str]) -> (Output, Value) {
+    let path = file.0.to_str().expect("a path in UTF-8");
+    let output = stepcast(&[&["simulate", path, "--config", MACHINE, "--json"], more].concat());
+    let report = json(&output);
+    (output, report)
+}
+
+#[test]
+fn wrong_usage_is_status_2_with_help() {
+    for arguments in
+        [&[][..], &["fly"], &["plan", "a.gcode"], &["simulate", "a", "--config", "b", "--fault", "x"]]
+    {
+        let output = stepcast(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(
+            stderr(&output).contains("--help") || stderr(&output).contains("Usage"),
+            "{}",
+            stderr(&output)
+        );
+    }
+    assert_eq!(stepcast(&["--help"]).status.code(), Some(0));
+}
+
+#[test]
+fn completions_are_written_for_every_shell() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let output = stepcast(&["completions", shell]);
+        assert_eq!(output.status.code(), Some(0));
+        assert!(String::from_utf8_lossy(&output.stdout).contains("virtual-printer"), "{shell}");
+    }
+}
+
+#[test]
+fn check_tells_good_files_from_bad_ones() {
+    let good = File::new("check-good.gcode", PRINT);
+    let path = good.0.to_str().unwrap();
+    let output = stepcast(&["check", path, "--config", MACHINE, "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(json(&output)["printable"], true);
+    let bad = File::new("check-bad.gcode", "G28\nSTART_PRINT\nG1 X9999\n");
+    let output = stepcast(&["check", bad.0.to_str().unwrap(), "--config", MACHINE]);
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("check-bad.gcode:2:") && text.contains("check-bad.gcode:3:"), "{text}");
+    assert!(stderr(&output).contains("cannot be printed"), "{}", stderr(&output));
+}
+
+#[test]
+fn files_that_are_no_gcode_are_named() {
+    for (name, content, code) in [
+        ("empty.gcode", &b""[..], "file-empty"),
+        ("model.stl", b"solid cube\n facet normal 0 0 1\n", "file-binary"),
+        ("part.bgcode", b"GCDE\x01\0\0\0\x01\0\0\0", "file-binary"),
+        ("cut.gcode.gz", b"\x1f\x8b\x08\0\0\0\0\0\0\x03\x4b", "file-cut-off"),
+    ] {
+        let file = File::new(name, content);
+        let path = file.0.to_str().unwrap();
+        for command in ["plan", "simulate"] {
+            let output = stepcast(&[command, path, "--config", MACHINE, "--json"]);
+            assert_eq!(output.status.code(), Some(1), "{command} {name}");
+            assert_eq!(json(&output)["error"]["code"], code, "{command} {name}");
+            assert!(stderr(&output).contains("to do:"), "{}", stderr(&output));
+        }
+    }
+}
+
+#[test]
+fn plan_counts_steps_and_bytes_and_writes_the_stream() {
+    let file = File::new("plan.gcode", PRINT);
+    let dump = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("plan.stream");
+    let arguments = [
+        "plan",
+        file.0.to_str().unwrap(),
+        "--config",
+        MACHINE,
+        "--json",
+        "--dump-stream",
+        dump.to_str().unwrap(),
+    ];
+    let output = stepcast(&arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let report = json(&output);
+    // To X50, around the square, three quarters of a circle of 10 mm radius, to X10; 80 steps a mm.
+    assert_eq!(report["motors"]["stepper_x"]["steps"], 80 * (50 + (10 + 10) + (20 + 10) + 50));
+    assert_eq!(report["motors"]["stepper_z"]["steps"], 120);
+    assert!(report["max_step_error_us"].as_f64().unwrap() <= 25.0);
+    assert!((report["filament_mm"].as_f64().unwrap() - 1.6).abs() < 1e-9);
+    let stream = fs::read(&dump).unwrap();
+    assert_eq!(report["bytes"].as_u64().unwrap(), stream.len() as u64);
+    assert_eq!(stream.last(), Some(&0x7e));
+    stepcast(&arguments);
+    assert_eq!(fs::read(&dump).unwrap(), stream, "the same plan twice");
+}
+
+#[test]
+fn a_print_is_simulated_to_its_end_whatever_the_link_does() {
+    let file = File::new("print.gcode", PRINT);
+    let (output, clean) = simulate(&file, &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(clean["result"], "done");
+    assert_eq!(clean["reason"], Value::Null);
+    for motor in ["stepper_x", "stepper_y", "stepper_z", "extruder"] {
+        let motor = &clean["motors"][motor];
+        assert_eq!(motor["planned_steps"], motor["counted_steps"]);
+        assert_eq!(motor["lost_steps"], 0);
+    }
+    assert!(clean["path_error_max_mm"].as_f64().unwrap() <= 0.02);
+    assert!(clean["temperature_error_max_c"].as_f64().unwrap() <= 3.0);
+    assert!((clean["motors"]["stepper_x"]["end_position_mm"].as_f64().unwrap() - 10.0).abs() < 1e-6);
+    assert_eq!(clean["after"]["heaters_off"], true);
+    let (output, damaged) = simulate(&file, &["--fault", "corrupt=0.01", "--seed", "9"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(damaged["retransmitted_bytes"].as_u64().unwrap() > 0);
+    assert_eq!(damaged["step_digest"], clean["step_digest"]);
+    assert_eq!(damaged["pulse_digest"], clean["pulse_digest"]);
+    let (_, again) = simulate(&file, &["--fault", "corrupt=0.01", "--seed", "9"]);
+    assert_eq!(again["sent_bytes"], damaged["sent_bytes"], "the same seed gives the same run");
+    let (output, small) = simulate(&file, &["--board", "stm32f103"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(small["board"], "stm32f103");
+}
+
+#[test]
+fn what_must_not_be_printed_is_refused_by_line() {
+    for (name, gcode, code, line) in [
+        ("cold.gcode", "G28\nG1 X10 E1 F600\n", "cold-extrusion", 2),
+        ("unhomed.gcode", "G1 X10 F600\n", "not-homed", 1),
+        ("range.gcode", "G28\nG1 X10 F600\nG1 X4000\n", "move-out-of-range", 3),
+        ("macro.gcode", "G28\nPRINT_START\nG1 X10 F600\n", "unknown-command", 2),
+        ("cut.gcode", "M104 S200\nG28\nG1 X10 F600\n", "file-cut-off", 3),
+    ] {
+        let file = File::new(name, gcode);
+        let (output, report) = simulate(&file, &[]);
+        assert_eq!(output.status.code(), Some(1), "{name}");
+        assert_eq!(report["result"], "refused", "{name}");
+        assert_eq!(report["error"]["code"], code, "{name}");
+        assert_eq!(report["error"]["line"], line, "{name}");
+        assert_eq!(report["motors"]["stepper_x"]["counted_steps"], 0, "{name}");
+        assert!(stderr(&output).contains(&format!("ine {line}")), "{}", stderr(&output));
+    }
+    let macro_file = File::new("macro-confirmed.gcode", "G28\nPRINT_START\nG1 X10 F600\n");
+    for confirm in [&["--confirm-line", "2"][..], &["--confirm-all"]] {
+        let (output, report) = simulate(&macro_file, confirm);
+        assert_eq!((output.status.code(), &report["result"]), (Some(0), &Value::from("done")));
+    }
+}
+
+#[test]
+fn every_fault_ends_with_its_own_error_and_a_safe_machine() {
+    let file = File::new("faults.gcode", PRINT);
+    for (fault, code) in [
+        ("sensor-open=extruder@20", "sensor-below-min"),
+        ("sensor-short=extruder@20", "sensor-above-max"),
+        ("heater-dead=extruder", "heater-not-heating"),
+        ("endstop-stuck-on=x", "endstop-still-triggered"),
+        ("endstop-stuck-off=y", "endstop-not-reached"),
+        ("unplug@20", "link-timeout"),
+        ("drop=1", "board-silent"),
+    ] {
+        let (output, report) = simulate(&file, &["--fault", fault]);
+        assert_eq!(output.status.code(), Some(1), "{fault}");
+        assert_eq!(report["result"], "failed", "{fault}");
+        assert_eq!(report["error"]["code"], code, "{fault}");
+        assert_eq!(report["after"]["heaters_off"], true, "{fault}");
+        assert_eq!(report["after"]["motors_still"], true, "{fault}");
+        assert!(stderr(&output).contains("safety:"), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_wrong_machine_file_is_said_by_line() {
+    let config = File::new("wrong.cfg", "[printer]\nkinematics: cartesian\nmax_velocity: fast\n");
+    let file = File::new("any.gcode", PRINT);
+    let output = stepcast(&["plan", file.0.to_str().unwrap(), "--config", config.0.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("wrong.cfg: line 3"), "{}", stderr(&output));
+    let output = stepcast(&["plan", file.0.to_str().unwrap(), "--config", "/nowhere.cfg"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("/nowhere.cfg"), "{}", stderr(&output));
+}
