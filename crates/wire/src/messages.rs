@@ -84,11 +84,21 @@ pub struct MessageSpec {
     pub id: u16,
 }
 
+/// How the dictionary spells a field's type: as the type says, unless the declaration says otherwise.
+macro_rules! field_format {
+    ($type:ty) => {
+        <$type as Field<'a>>::FORMAT
+    };
+    ($type:ty, $format:literal) => {
+        $format
+    };
+}
+
 macro_rules! messages {
     (
         $(#[$enum_doc:meta])*
         $enum:ident, $kind:ident, $id_of:ident, $index_of:ident;
-        $($(#[$doc:meta])* $name:ident $wire_name:literal { $($field:ident: $type:ty),* $(,)? })*
+        $($(#[$doc:meta])* $name:ident $wire_name:literal { $($field:ident: $type:ty $(as $format:literal)?),* $(,)? })*
     ) => {
         /// Names the members of the enum of the same name, without their values.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -110,7 +120,7 @@ macro_rules! messages {
                         name: $wire_name,
                         fields: &[$(FieldSpec {
                             name: stringify!($field),
-                            format: <$type as Field<'a>>::FORMAT,
+                            format: field_format!($type $(, $format)?),
                         }),*],
                         id,
                     },)*
@@ -294,8 +304,8 @@ messages! {
     EndstopState "endstop_state" { oid: u8, homing: u8, next_clock: u32, pin_value: u8 }
     /// The state of a trigger.
     TrsyncState "trsync_state" { oid: u8, can_trigger: u8, trigger_reason: u8, clock: u32 }
-    /// One or more sums of readings, little-endian.
-    AnalogInState "analog_in_state" { oid: u8, next_clock: u32, values: &'a [u8] }
+    /// One or more sums of readings, little-endian. Klipper's host insists on this spelling of the type.
+    AnalogInState "analog_in_state" { oid: u8, next_clock: u32, values: &'a [u8] as "%*s" }
     /// How busy the board is.
     Stats "stats" { count: u32, sum: u32, sumsq: u32 }
     /// The board has just stopped everything.
