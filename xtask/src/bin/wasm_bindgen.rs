@@ -1,7 +1,7 @@
 //! Makes JavaScript bindings for a WebAssembly module: `xtask-wasm-bindgen MODULE.wasm OUTPUT_FOLDER` writes
 //! `OUTPUT_FOLDER/node` and `OUTPUT_FOLDER/web`. Started by `cargo xtask wasm`.
 
-use std::path::PathBuf;
+use std::{fs, path::PathBuf};
 
 use anyhow::{Context, Result};
 use wasm_bindgen_cli_support::Bindgen;
@@ -23,5 +23,7 @@ fn main() -> Result<()> {
             .generate(output.join(name))
             .with_context(|| format!("cannot make the bindings for {name}"))?;
     }
+    // The bindings for Node are CommonJS, whatever the package around them says.
+    fs::write(output.join("node").join("package.json"), "{ \"type\": \"commonjs\" }\n")?;
     Ok(())
 }
