@@ -171,7 +171,7 @@ impl Connecting {
             Some(Message::Shutdown { reason }) => return Ok(Outcome::Shutdown(reason)),
             // The reason follows as the answer to a command that is not carried out in that state.
             Some(Message::Config { is_shutdown: true, .. }) => {
-                self.board.control(&Command::AllocateOids { count: 0 })
+                self.board.control(&Command::AllocateOids { count: 0 });
             }
             Some(Message::Config { is_config, crc, move_count, .. }) => {
                 if let Some(outcome) = self.advance(is_config, crc, move_count)? {
