@@ -36,6 +36,10 @@ const steps = [
     name: 'firmware for thumbv6m',
     commands: [['cargo', 'build', '--package', 'firmware-core', '--target', 'thumbv6m-none-eabi', '--release']],
   },
+  {
+    name: 'virtual printer for WebAssembly',
+    commands: [['cargo', 'build', '--package', 'virtual-printer', '--target', 'wasm32-unknown-unknown']],
+  },
   { name: 'Rust tests', commands: [['cargo', 'test', '--workspace']] },
   { name: 'release build', commands: [['cargo', 'build', '--release', '--package', 'stepcast']] },
   {
