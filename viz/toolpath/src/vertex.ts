@@ -4,7 +4,7 @@
  * Does: packing and unpacking, and the numbers that the shader needs. Does not know: where vertices come from, how they
  * are drawn. Units: mm; a position's step is the header's.
  */
-import type { Mm, VertexIndex } from './units.ts';
+import type { Mm, VertexIndex } from './units';
 
 /** u32 words of one vertex. */
 export const WORDS_PER_VERTEX = 4;

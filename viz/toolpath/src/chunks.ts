@@ -1,0 +1,182 @@
+/**
+ * The vertices of a file, in pieces that each fit one texture, and the boxes around them.
+ *
+ * Does: takes vertices as they come and keeps them in rows of texels; splits a range of vertices among the pieces. Each
+ * piece repeats the two vertices before it and the one after, because a bead's ends need its neighbours.
+ * Does not know: textures, drawing. Units: vertex indices; mm in the boxes.
+ */
+import type { BoxMm } from './camera';
+import type { VertexRange } from './layers';
+import { FLAGS, featureNumber, type VertexHeader, WORDS_PER_VERTEX } from './vertex';
+
+/** Texels in a row: what every WebGL2 offers. */
+export const TEXELS_PER_ROW = 2048;
+/** Rows of a full piece: 1 MiB. */
+export const ROWS_PER_CHUNK = 32;
+const TEXELS_PER_CHUNK = TEXELS_PER_ROW * ROWS_PER_CHUNK;
+/** Texels before a piece's own: two vertices of the piece before it. */
+export const LEAD_TEXELS = 2;
+const TRAIL_TEXELS = 1;
+/** Vertices that a piece has of its own. */
+export const VERTICES_PER_CHUNK = TEXELS_PER_CHUNK - LEAD_TEXELS - TRAIL_TEXELS;
+
+/** One texture's worth. */
+export interface Chunk {
+  /** The file's index of the first vertex of its own, which lies at texel {@link LEAD_TEXELS}. */
+  readonly firstVertex: number;
+  /** Whole rows of texels. */
+  data: Uint32Array<ArrayBuffer>;
+  rows: number;
+  /** Vertices of its own. */
+  count: number;
+  /** Counts changes of `data`, so that an owner of a copy sees that it is old. */
+  version: number;
+}
+
+/** A part of a chunk: own vertices `first … first + count − 1`, counted from the chunk's first. */
+export interface ChunkRange {
+  readonly chunk: Chunk;
+  readonly first: number;
+  readonly count: number;
+}
+
+const POSITION_MASK = 0xf_ffff;
+const NOT_LAID = FLAGS.travel | FLAGS.break;
+/** What is not part of the printed thing. */
+const BESIDE_THE_PART =
+  (1 << featureNumber('skirt')) | (1 << featureNumber('custom')) | (1 << featureNumber('primeTower'));
+
+/** A box in steps, grown vertex by vertex. */
+class StepBox {
+  readonly min: [number, number, number] = [Infinity, Infinity, Infinity];
+  readonly max: [number, number, number] = [-Infinity, -Infinity, -Infinity];
+
+  add(x: number, y: number, z: number): void {
+    const { min, max } = this;
+    if (x < min[0]) min[0] = x;
+    if (y < min[1]) min[1] = y;
+    if (z < min[2]) min[2] = z;
+    if (x > max[0]) max[0] = x;
+    if (y > max[1]) max[1] = y;
+    if (z > max[2]) max[2] = z;
+  }
+
+  inMm(header: VertexHeader): BoxMm | null {
+    if (this.min[0] > this.max[0]) return null;
+    const mm = (steps: number, axis: 0 | 1 | 2): number => header.originMm[axis] + steps * header.stepMm;
+    const { min, max } = this;
+    return {
+      min: [mm(min[0], 0), mm(min[1], 1), mm(min[2], 2)],
+      max: [mm(max[0], 0), mm(max[1], 1), mm(max[2], 2)],
+    };
+  }
+}
+
+export class VertexStore {
+  readonly header: VertexHeader;
+  readonly chunks: Chunk[] = [];
+  #count = 0;
+  readonly #partBox = new StepBox();
+  readonly #laidBox = new StepBox();
+
+  constructor(header: VertexHeader) {
+    this.header = header;
+  }
+
+  get count(): number {
+    return this.#count;
+  }
+
+  /** The box of all that is laid down; of the part alone if there is one. */
+  box(): BoxMm | null {
+    return this.#partBox.inMm(this.header) ?? this.#laidBox.inMm(this.header);
+  }
+
+  /** The box of everything laid down, skirt and prime line too. */
+  boxOfAll(): BoxMm | null {
+    return this.#laidBox.inMm(this.header);
+  }
+
+  /** Adds vertices; `words` holds four words for each, a rest of less than a vertex is left out. */
+  append(words: Uint32Array): void {
+    const total = Math.floor(words.length / WORDS_PER_VERTEX);
+    this.#measure(words, total);
+    let taken = 0;
+    while (taken < total) {
+      const chunk = this.#open();
+      const free = VERTICES_PER_CHUNK - chunk.count;
+      const count = Math.min(free, total - taken);
+      const part = words.subarray(taken * WORDS_PER_VERTEX, (taken + count) * WORDS_PER_VERTEX);
+      write(chunk, chunk.count, part);
+      const before = this.chunks.at(-2);
+      if (before && chunk.count === 0) write(before, before.count, part.subarray(0, TRAIL_TEXELS * WORDS_PER_VERTEX));
+      chunk.count += count;
+      taken += count;
+      this.#count += count;
+    }
+  }
+
+  /** Where a range of vertices lies. */
+  split(range: VertexRange): ChunkRange[] {
+    const parts: ChunkRange[] = [];
+    const start = Math.max(Math.floor(range.first / VERTICES_PER_CHUNK), 0);
+    for (let at = start; at < this.chunks.length; at++) {
+      const chunk = this.chunks[at];
+      if (!chunk || chunk.firstVertex >= range.end) break;
+      const first = Math.max(range.first - chunk.firstVertex, 0);
+      const end = Math.min(range.end - chunk.firstVertex, chunk.count);
+      if (end > first) parts.push({ chunk, first, count: end - first });
+    }
+    return parts;
+  }
+
+  /** The chunk with room for at least one vertex. */
+  #open(): Chunk {
+    const last = this.chunks.at(-1);
+    if (last && last.count < VERTICES_PER_CHUNK) return last;
+    const chunk: Chunk = {
+      firstVertex: this.#count,
+      data: new Uint32Array(TEXELS_PER_ROW * WORDS_PER_VERTEX),
+      rows: 1,
+      count: 0,
+      version: 0,
+    };
+    if (last) {
+      const from = last.count * WORDS_PER_VERTEX;
+      chunk.data.set(last.data.subarray(from, from + LEAD_TEXELS * WORDS_PER_VERTEX));
+    } else {
+      for (let texel = 0; texel < LEAD_TEXELS; texel++) chunk.data[texel * WORDS_PER_VERTEX + 2] = FLAGS.break;
+    }
+    this.chunks.push(chunk);
+    return chunk;
+  }
+
+  #measure(words: Uint32Array, total: number): void {
+    for (let at = 0; at < total * WORDS_PER_VERTEX; at += WORDS_PER_VERTEX) {
+      const kind = words[at + 2] ?? 0;
+      if (kind & NOT_LAID) continue;
+      const x = (words[at] ?? 0) & POSITION_MASK;
+      const y = (words[at + 1] ?? 0) & POSITION_MASK;
+      const z = kind & POSITION_MASK;
+      this.#laidBox.add(x, y, z);
+      if (((BESIDE_THE_PART >>> ((kind >>> 20) & 31)) & 1) === 0) this.#partBox.add(x, y, z);
+    }
+  }
+}
+
+/** Puts vertices behind the `at` that the chunk has of its own, and grows it by doubling its rows. */
+function write(chunk: Chunk, at: number, words: Uint32Array): void {
+  const texels = LEAD_TEXELS + at + words.length / WORDS_PER_VERTEX + TRAIL_TEXELS;
+  const needed = Math.min(Math.ceil(texels / TEXELS_PER_ROW), ROWS_PER_CHUNK);
+  if (needed > chunk.rows) {
+    chunk.rows = Math.min(Math.max(needed, chunk.rows * 2), ROWS_PER_CHUNK);
+    const grown = new Uint32Array(chunk.rows * TEXELS_PER_ROW * WORDS_PER_VERTEX);
+    grown.set(chunk.data);
+    chunk.data = grown;
+  }
+  chunk.data.set(words, (LEAD_TEXELS + at) * WORDS_PER_VERTEX);
+  // The texel behind the last vertex must not look like a neighbour until one comes.
+  const behind = (LEAD_TEXELS + at) * WORDS_PER_VERTEX + words.length;
+  if (behind < chunk.data.length) chunk.data[behind + 2] = FLAGS.break;
+  chunk.version += 1;
+}
