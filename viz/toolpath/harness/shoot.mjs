@@ -1,0 +1,135 @@
+#!/usr/bin/env node
+// Opens the built harness in a real Chromium, takes pictures and measures: `npm run harness [-- OUTPUT_FOLDER]`.
+// The browser: CHROME_PATH, else /usr/bin/chromium. Software GL, so that every machine gives the same pictures.
+import { mkdirSync } from 'node:fs';
+import { readFile } from 'node:fs/promises';
+import { createServer } from 'node:http';
+import { extname, join, normalize } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { chromium } from 'playwright-core';
+
+const dist = fileURLToPath(new URL('./dist', import.meta.url));
+const out = process.argv[2] ?? join(dist, 'pictures');
+const only = process.argv[3];
+const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.json': 'application/json' };
+
+const server = createServer(async (request, response) => {
+  const path = normalize(new URL(request.url ?? '/', 'http://x').pathname);
+  try {
+    const body = await readFile(join(dist, path === '/' ? 'index.html' : path));
+    response.writeHead(200, { 'content-type': TYPES[extname(path)] ?? (path === '/' ? 'text/html' : 'application/octet-stream') });
+    response.end(body);
+  } catch {
+    response.writeHead(404).end();
+  }
+});
+
+const drawnAtRest = (page, since) =>
+  page.waitForFunction((n) => window.harness.ready && window.harness.frames.slice(n).some((f) => f.kind === 'full'), since, {
+    timeout: 120_000,
+  });
+const frameCount = (page) => page.evaluate(() => window.harness.frames.length);
+
+async function open(browser, url, query, size = { width: 1200, height: 800 }) {
+  const page = await browser.newPage({ viewport: size });
+  page.on('console', (message) => message.type() !== 'log' && console.log(`  [${message.type()}] ${message.text()}`));
+  page.on('pageerror', (error) => console.log(`  [page] ${error}`));
+  await page.goto(`${url}?${query}`);
+  await drawnAtRest(page, 0);
+  return page;
+}
+
+async function act(page, name, body) {
+  const since = await frameCount(page);
+  await page.evaluate(body);
+  await drawnAtRest(page, since);
+  await page.waitForTimeout(120);
+  await page.screenshot({ path: join(out, `${name}.png`) });
+}
+
+async function pictures(browser, url) {
+  for (const theme of ['light', 'dark']) {
+    const page = await open(browser, url, `theme=${theme}&segments=60000`);
+    await act(page, `${theme}-whole`, () => window.harness.host.fit());
+    await act(page, `${theme}-cut`, () => window.harness.host.show({ layerTo: 20, travel: true, retractions: true, seams: true }));
+    await act(page, `${theme}-near`, () => {
+      const { host } = window.harness;
+      host.show({ layerTo: 30, travel: false, retractions: false, seams: false });
+      host.zoom(0.16, [230, 60]);
+    });
+    await act(page, `${theme}-corner`, () => window.harness.host.zoom(0.3, [0, 0]));
+    await act(page, `${theme}-top`, () => {
+      const { host } = window.harness;
+      host.show({ layerTo: 1000 });
+      host.fit({ azimuth: 0, elevation: 1.5 });
+    });
+    await act(page, `${theme}-printed`, () => {
+      const { host, vertexCount } = window.harness;
+      host.fit({ azimuth: -0.5, elevation: 0.5 });
+      host.setPrintedUpTo(Math.round(vertexCount * 0.4));
+    });
+    await page.close();
+  }
+}
+
+async function robustness(browser, url) {
+  const page = await open(browser, url, 'main=1&segments=60000&theme=dark');
+  await page.screenshot({ path: join(out, 'main-thread.png') });
+  const since = await frameCount(page);
+  await page.evaluate(async () => {
+    const gl = document.querySelector('#view').getContext('webgl2');
+    const lose = gl.getExtension('WEBGL_lose_context');
+    lose.loseContext();
+    await new Promise((resolve) => setTimeout(resolve, 300));
+    lose.restoreContext();
+  });
+  await drawnAtRest(page, since);
+  await page.waitForTimeout(120);
+  await page.screenshot({ path: join(out, 'restored.png') });
+  console.log('context lost and restored:', await page.evaluate(() => window.harness.events.filter((e) => e.startsWith('context')).join(', ')));
+  await page.close();
+}
+
+async function measure(browser, url) {
+  for (const segments of [200_000, 1_000_000]) {
+    const page = await browser.newPage({ viewport: { width: 1200, height: 800 } });
+    await page.goto(`${url}?segments=${segments}`);
+    await drawnAtRest(page, 0);
+    await page.waitForTimeout(1500);
+    const rest = await page.evaluate(() => window.harness.frames.filter((f) => f.kind === 'full').at(-1));
+    const since = await frameCount(page);
+    await page.evaluate(async () => {
+      for (let step = 0; step < 120; step++) {
+        window.harness.host.orbit(4, step % 2);
+        await new Promise((resolve) => setTimeout(resolve, 16));
+      }
+    });
+    const moving = await page.evaluate((n) => window.harness.frames.slice(n), since);
+    await page.screenshot({ path: join(out, `moving-${segments}.png`) });
+    await drawnAtRest(page, since);
+    const times = moving.map((f) => f.longestMs).sort((a, b) => a - b);
+    const at = (p) => times[Math.min(Math.floor(times.length * p), times.length - 1)]?.toFixed(0);
+    const vertices = await page.evaluate(() => window.harness.vertexCount);
+    console.log(
+      `${vertices} vertices: full picture ${rest.totalMs.toFixed(0)} ms (longest slice ${rest.longestMs.toFixed(0)}); ` +
+        `moving: ${moving.length} frames in 2 s (${moving.at(-1)?.kind}, ${Math.round(moving.at(-1)?.segments ?? 0)} segments), p50 ${at(0.5)} p95 ${at(0.95)} max ${at(1)} ms`,
+    );
+    await page.close();
+  }
+}
+
+mkdirSync(out, { recursive: true });
+await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+const url = `http://127.0.0.1:${server.address().port}/`;
+const browser = await chromium.launch({
+  executablePath: process.env.CHROME_PATH ?? '/usr/bin/chromium',
+  args: ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
+});
+try {
+  if (!only || only === 'pictures') await pictures(browser, url);
+  if (!only || only === 'robustness') await robustness(browser, url);
+  if (!only || only === 'measure') await measure(browser, url);
+} finally {
+  await browser.close();
+  server.close();
+}

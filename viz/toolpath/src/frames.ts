@@ -1,0 +1,211 @@
+/**
+ * When to draw: quick pictures while something moves, the full one at rest, never more than one frame on its way.
+ *
+ * A full picture is drawn in slices of about one frame, out of sight, and shown when it is complete; whatever moves in between
+ * abandons it. Frames are timed until the GPU is done with them, since issuing the commands takes next to no time.
+ * Does not know: what is drawn. Units: ms, segments.
+ */
+import { DetailBudget, FRAME_TARGET_MS } from './detail';
+import type { Ms } from './units';
+
+/** The clock and the timers of the realm that the loop runs in. */
+export interface FrameClock {
+  now(): Ms;
+  requestFrame(callback: () => void): number;
+  cancelFrame(handle: number): void;
+  setTimer(callback: () => void, delayMs: Ms): number;
+  clearTimer(handle: number): void;
+}
+
+/** What one go drew. */
+export interface Drawn {
+  readonly segments: number;
+  /** True when the picture is complete and shown. */
+  readonly complete: boolean;
+}
+
+export interface Painter {
+  /** How many segments a full picture has. */
+  fullSegments(): number;
+  /** Draws and shows a picture of about so many segments. */
+  drawQuick(budget: number): number;
+  /** Goes on with the full picture (from its beginning if `restart`) by about so many segments. */
+  drawSlice(budget: number, restart: boolean): Drawn;
+  /** Mends the complete picture after a small change; false if it has to be drawn anew. */
+  patch(): boolean;
+  /** A question whether the GPU has done all that was asked of it. */
+  fence(): () => boolean;
+}
+
+export interface FrameReport {
+  readonly kind: 'quick' | 'full' | 'patch';
+  readonly segments: number;
+  /** From the first command until the GPU was done; for a full picture the longest slice. */
+  readonly longestMs: Ms;
+  /** From the beginning of the picture to its end. */
+  readonly totalMs: Ms;
+}
+
+/** After the last movement, until the full picture is begun. */
+const REST_MS = 140;
+const POLL_MS = 2;
+/** A GPU that is silent for so long has lost its context or is stuck: the loop goes on. */
+const FENCE_MAX_MS = 10_000;
+
+type Picture = 'none' | 'begun' | 'complete';
+
+export class FrameLoop {
+  readonly #painter: Painter;
+  readonly #clock: FrameClock;
+  readonly #report: (report: FrameReport) => void;
+  readonly #quickBudget = new DetailBudget();
+  readonly #fullBudget = new DetailBudget();
+  #frame: number | null = null;
+  #timer: number | null = null;
+  #poll: number | null = null;
+  #stopped = false;
+  #quickWanted = false;
+  #fullWanted = false;
+  #patchWanted = false;
+  #picture: Picture = 'none';
+  #pictureBegan: Ms = 0;
+  #pictureSegments = 0;
+  #longest: Ms = 0;
+
+  constructor(painter: Painter, clock: FrameClock, report: (report: FrameReport) => void) {
+    this.#painter = painter;
+    this.#clock = clock;
+    this.#report = report;
+  }
+
+  /** Something that moves has changed the picture. */
+  moved(): void {
+    if (this.#fullFits()) {
+      this.redraw();
+      return;
+    }
+    this.#picture = 'none';
+    this.#fullWanted = false;
+    this.#quickWanted = true;
+    this.#schedule();
+    if (this.#timer !== null) this.#clock.clearTimer(this.#timer);
+    this.#timer = this.#clock.setTimer(() => {
+      this.#timer = null;
+      this.#fullWanted = true;
+      this.#schedule();
+    }, REST_MS);
+  }
+
+  /** The picture is to be drawn anew; the old one stays until then. */
+  redraw(): void {
+    this.#picture = 'none';
+    this.#fullWanted = true;
+    this.#schedule();
+  }
+
+  /** A little has changed: mended on the complete picture, or part of the one that comes next. */
+  patched(): void {
+    this.#patchWanted = true;
+    this.#schedule();
+  }
+
+  /** Draws no more until {@link resume}. */
+  pause(): void {
+    this.#stopped = true;
+    for (const handle of [this.#timer, this.#poll]) if (handle !== null) this.#clock.clearTimer(handle);
+    if (this.#frame !== null) this.#clock.cancelFrame(this.#frame);
+    this.#frame = null;
+    this.#timer = null;
+    this.#poll = null;
+    this.#picture = 'none';
+  }
+
+  resume(): void {
+    this.#stopped = false;
+    this.moved();
+  }
+
+  #fullFits(): boolean {
+    const estimate = this.#fullBudget.estimateMs(this.#painter.fullSegments());
+    return estimate !== null && estimate <= FRAME_TARGET_MS;
+  }
+
+  #schedule(): void {
+    if (this.#stopped || this.#frame !== null || this.#poll !== null) return;
+    this.#frame = this.#clock.requestFrame(() => {
+      this.#frame = null;
+      this.#draw();
+    });
+  }
+
+  #draw(): void {
+    const began = this.#clock.now();
+    if (this.#quickWanted) {
+      this.#quickWanted = false;
+      this.#patchWanted = false;
+      const segments = this.#painter.drawQuick(this.#quickBudget.segments);
+      this.#await(began, (elapsed) => {
+        this.#quickBudget.measured(segments, elapsed);
+        this.#report({ kind: 'quick', segments, longestMs: elapsed, totalMs: elapsed });
+      });
+    } else if (this.#fullWanted) {
+      this.#drawSlice(began);
+    } else if (this.#patchWanted) {
+      this.#patchWanted = false;
+      if (this.#picture !== 'complete' || !this.#painter.patch()) return this.redraw();
+      this.#await(began, (elapsed) =>
+        this.#report({ kind: 'patch', segments: 0, longestMs: elapsed, totalMs: elapsed }),
+      );
+    }
+  }
+
+  #drawSlice(began: Ms): void {
+    const restart = this.#picture !== 'begun';
+    if (restart) {
+      this.#picture = 'begun';
+      this.#pictureBegan = began;
+      this.#pictureSegments = 0;
+      this.#longest = 0;
+    }
+    const { segments, complete } = this.#painter.drawSlice(this.#fullBudget.segments, restart);
+    this.#pictureSegments += segments;
+    if (complete) {
+      this.#fullWanted = false;
+      this.#picture = 'complete';
+    }
+    this.#await(began, (elapsed) => {
+      this.#fullBudget.measured(segments, elapsed);
+      this.#longest = Math.max(this.#longest, elapsed);
+      if (!complete) return;
+      const totalMs = this.#clock.now() - this.#pictureBegan;
+      this.#report({ kind: 'full', segments: this.#pictureSegments, longestMs: this.#longest, totalMs });
+    });
+  }
+
+  /** Waits for the GPU, then goes on with what is wanted. */
+  #await(began: Ms, done: (elapsed: Ms) => void): void {
+    const isDone = this.#painter.fence();
+    const poll = (): void => {
+      this.#poll = null;
+      const elapsed = this.#clock.now() - began;
+      if (!isDone() && elapsed < FENCE_MAX_MS) {
+        this.#poll = this.#clock.setTimer(poll, POLL_MS);
+        return;
+      }
+      done(elapsed);
+      if (this.#quickWanted || this.#fullWanted || this.#patchWanted) this.#schedule();
+    };
+    this.#poll = this.#clock.setTimer(poll, 0);
+  }
+}
+
+/** The clock of a window or a dedicated worker. */
+export function realmClock(): FrameClock {
+  return {
+    now: () => performance.now(),
+    requestFrame: (callback) => requestAnimationFrame(callback),
+    cancelFrame: (handle) => cancelAnimationFrame(handle),
+    setTimer: (callback, delayMs) => setTimeout(callback, delayMs) as unknown as number,
+    clearTimer: (handle) => clearTimeout(handle),
+  };
+}

@@ -1,0 +1,79 @@
+/**
+ * What the host and the worker of the view say to each other.
+ *
+ * Requests carry out a method of the view each; `source` hands over a port on which requests may arrive from elsewhere (a
+ * worker that makes vertices), so that they do not pass through the main thread.
+ */
+import type { Bed } from './bed';
+import type { CameraState } from './camera';
+import type { FrameReport } from './frames';
+import type { Layer } from './layers';
+import type { Theme } from './palette';
+import type { CssPx, VertexIndex } from './units';
+import type { VertexHeader } from './vertex';
+import type { Shown, ToolpathView, ViewSizePx } from './view';
+
+export type ViewRequest =
+  | { readonly type: 'setBed'; readonly bed: Bed | null }
+  | { readonly type: 'begin'; readonly header: VertexHeader }
+  | { readonly type: 'append'; readonly vertices: Uint32Array }
+  | { readonly type: 'end' }
+  | { readonly type: 'clear' }
+  | { readonly type: 'setLayers'; readonly layers: readonly Layer[] }
+  | { readonly type: 'show'; readonly shown: Partial<Shown> }
+  | { readonly type: 'setPrintedUpTo'; readonly vertex: VertexIndex | null }
+  | { readonly type: 'setTheme'; readonly theme: Theme }
+  | { readonly type: 'orbit'; readonly dx: CssPx; readonly dy: CssPx }
+  | { readonly type: 'pan'; readonly dx: CssPx; readonly dy: CssPx }
+  | { readonly type: 'zoom'; readonly factor: number; readonly at: readonly [CssPx, CssPx] }
+  | { readonly type: 'fit'; readonly direction?: Pick<CameraState, 'azimuth' | 'elevation'> }
+  | { readonly type: 'resize'; readonly size: ViewSizePx };
+
+/** What only the worker itself understands. */
+export type WorkerRequest =
+  | ViewRequest
+  | { readonly type: 'start'; readonly canvas: OffscreenCanvas; readonly size: ViewSizePx }
+  | { readonly type: 'source'; readonly port: MessagePort }
+  | { readonly type: 'dispose' };
+
+export type ViewEvent =
+  | { readonly type: 'ready' }
+  /** No picture can be drawn; the reason is the browser's. */
+  | { readonly type: 'failed'; readonly reason: string }
+  | { readonly type: 'frame'; readonly report: FrameReport }
+  | { readonly type: 'contextLost' }
+  | { readonly type: 'contextRestored' };
+
+/** Carries a request out. */
+export function carryOut(view: ToolpathView, request: ViewRequest): void {
+  switch (request.type) {
+    case 'setBed':
+      return view.setBed(request.bed);
+    case 'begin':
+      return view.begin(request.header);
+    case 'append':
+      return view.append(request.vertices);
+    case 'end':
+      return view.end();
+    case 'clear':
+      return view.clear();
+    case 'setLayers':
+      return view.setLayers(request.layers);
+    case 'show':
+      return view.show(request.shown);
+    case 'setPrintedUpTo':
+      return view.setPrintedUpTo(request.vertex);
+    case 'setTheme':
+      return view.setTheme(request.theme);
+    case 'orbit':
+      return view.orbit(request.dx, request.dy);
+    case 'pan':
+      return view.pan(request.dx, request.dy);
+    case 'zoom':
+      return view.zoom(request.factor, request.at);
+    case 'fit':
+      return view.fit(request.direction);
+    case 'resize':
+      return view.resize(request.size);
+  }
+}

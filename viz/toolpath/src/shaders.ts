@@ -1,0 +1,243 @@
+/**
+ * The shaders: each vertex shader pulls what it needs from the texture of vertices by gl_VertexID; nothing else is uploaded.
+ *
+ * A bead is an elliptic tube of which only the half that faces the eye is drawn: at each end three points of the
+ * ellipse (left outline, nearest, right outline), whose normals interpolate to a round look, and for the caps the
+ * point opposite and a tip. Where the path bends by less than 120 degrees neighbours share a mitred end, so walls are closed;
+ * elsewhere the cap ends the bead. Units: mm; bits as in vertex.ts (docs/vertex.md).
+ */
+import { LEAD_TEXELS, TEXELS_PER_ROW } from './chunks';
+import { FIELDS, FLAGS, FEATURE_COUNT_MAX, SIZE_STEP_MM } from './vertex';
+
+/** Points of one bead: five at each end. */
+export const POINTS_PER_BEAD = 10;
+
+const mask = (bits: number): string => `${((1 << bits) - 1) >>> 0}u`;
+const ROW_SHIFT = Math.log2(TEXELS_PER_ROW);
+
+/** What every shader that pulls vertices begins with. */
+const PULL = /* glsl */ `
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+
+uniform highp usampler2D uVertices;
+uniform uint uBase;
+uniform mat4 viewMatrix;
+uniform mat4 projectionMatrix;
+uniform vec3 uOrigin;
+uniform float uStep;
+uniform uint uPrinted;
+
+const uint TRAVEL = ${FLAGS.travel}u;
+const uint BREAK = ${FLAGS.break}u;
+const uint WIPE = ${FLAGS.wipe}u;
+const uint NOT_LAID = TRAVEL | BREAK;
+
+uvec4 vertexAt(int texel) {
+  return texelFetch(uVertices, ivec2(texel & ${TEXELS_PER_ROW - 1}, texel >> ${ROW_SHIFT}), 0);
+}
+vec3 placeOf(uvec4 v) {
+  return uOrigin + vec3(v.xyz & ${mask(FIELDS.x.bits)}) * uStep;
+}
+uint featureOf(uvec4 v) {
+  return (v.z >> ${FIELDS.feature.shift}) & ${mask(FIELDS.feature.bits)};
+}
+/** A place that is clipped away. */
+const vec4 NOWHERE = vec4(0.0, 0.0, -2.0, 1.0);
+`;
+
+export const BEAD_VERTEX = /* glsl */ `${PULL}
+uniform vec3 cameraPosition;
+uniform uint uFeatures;
+uniform int uStride;
+uniform float uHeightScale;
+uniform float uBedZ;
+/** Millimetres that a pixel covers, for each millimetre of distance. */
+uniform float uPixelAngle;
+uniform vec2 uDefaultSize;
+uniform vec3 uPalette[${FEATURE_COUNT_MAX}];
+uniform vec3 uRemaining;
+
+out vec3 vNormal;
+out vec3 vColour;
+
+const float SIZE_STEP = ${SIZE_STEP_MM};
+/** Cosine of the sharpest bend that is mitred. */
+const float MITRE_COS_MIN = -0.5;
+const float TIP = 0.8;
+
+bool shown(uvec4 v) {
+  return (v.z & NOT_LAID) == 0u && ((uFeatures >> featureOf(v)) & 1u) == 1u;
+}
+vec2 sizeOf(uvec4 v) {
+  float width = float((v.x >> ${FIELDS.width.shift}) & ${mask(FIELDS.width.bits)}) * SIZE_STEP;
+  float height = float((v.y >> ${FIELDS.height.shift}) & ${mask(FIELDS.height.bits)}) * SIZE_STEP;
+  return vec2(width > 0.0 ? width : uDefaultSize.x, height > 0.0 ? height : uDefaultSize.y);
+}
+
+void main() {
+  int bead = gl_VertexID / ${POINTS_PER_BEAD};
+  int point = gl_VertexID - bead * ${POINTS_PER_BEAD};
+  bool atEnd = point >= 5;
+  int part = atEnd ? point - 5 : point;
+  int texel = bead * uStride + ${LEAD_TEXELS};
+
+  uvec4 own = vertexAt(texel);
+  vNormal = vec3(0.0, 0.0, 1.0);
+  vColour = vec3(0.0);
+  gl_Position = NOWHERE;
+  if (!shown(own)) return;
+  uvec4 before = vertexAt(texel - 1);
+  vec3 from = placeOf(before);
+  vec3 to = placeOf(own);
+  float len = length(to - from);
+  if (len < 1e-6) return;
+  vec3 along = (to - from) / len;
+
+  // The neighbour at this end, and whether the bead goes on into it.
+  uvec4 far = vertexAt(atEnd ? texel + 1 : texel - 2);
+  uvec4 neighbour = atEnd ? far : before;
+  vec3 other = atEnd ? placeOf(far) - to : from - placeOf(far);
+  float otherLen = length(other);
+  vec2 size = sizeOf(own);
+  vec3 tangent = along;
+  float mitre = 1.0;
+  bool joined = false;
+  if (shown(neighbour) && otherLen > 1e-6) {
+    float bend = dot(along, other / otherLen);
+    if (bend > MITRE_COS_MIN) {
+      joined = true;
+      tangent = normalize(along + other / otherLen);
+      mitre = 1.0 / max(dot(tangent, along), 0.5);
+      size = 0.5 * (size + sizeOf(neighbour));
+    }
+  }
+
+  vec3 here = atEnd ? to : from;
+  // A bead that stands for the layers below it reaches down to them, but not through the bed.
+  float height = uHeightScale > 1.0 ? min(size.y * uHeightScale, max(here.z - uBedZ, size.y)) : size.y;
+  vec2 half_ = 0.5 * vec2(size.x, height);
+  vec3 centre = here - vec3(0.0, 0.0, half_.y);
+  float flat_ = length(tangent.xy);
+  vec3 right = flat_ > 1e-4 ? vec3(tangent.y, -tangent.x, 0.0) / flat_ : vec3(1.0, 0.0, 0.0);
+  vec3 up = cross(right, tangent);
+
+  // The ellipse as a unit circle: the outline is where the normal is across the line of sight.
+  vec3 sight = cameraPosition - centre;
+  vec2 q = vec2(dot(sight, right), dot(sight, up)) / half_;
+  q = length(q) > 1e-6 ? normalize(q) : vec2(0.0, 1.0);
+  vec2 c = part == 0 ? vec2(-q.y, q.x) : part == 2 ? vec2(q.y, -q.x) : part == 3 ? -q : q;
+  vec3 round_ = normalize(right * (c.x / half_.x) + up * (c.y / half_.y));
+  vec3 place = centre + right * (c.x * half_.x * mitre) + up * (c.y * half_.y);
+  if (part == 4) {
+    vec3 outward = atEnd ? along : -along;
+    place = joined ? centre : centre + outward * (half_.x * TIP);
+    round_ = outward;
+  }
+
+  // Beads thinner than a pixel would glitter: far away each has one normal.
+  float pixel = uPixelAngle * length(sight);
+  vec3 facing = normalize(right * (q.x / half_.x) + up * (q.y / half_.y));
+  vNormal = mat3(viewMatrix) * mix(round_, facing, smoothstep(0.3, 1.0, pixel / size.x));
+  vec3 colour = uPalette[featureOf(own)];
+  vColour = uBase + uint(bead * uStride) < uPrinted ? colour : mix(colour, uRemaining, 0.84);
+  gl_Position = projectionMatrix * (viewMatrix * vec4(place, 1.0));
+}
+`;
+
+export const BEAD_FRAGMENT = /* glsl */ `
+precision highp float;
+in vec3 vNormal;
+in vec3 vColour;
+out vec4 colour;
+
+const vec3 KEY = vec3(-0.36, 0.62, 0.70);
+const vec3 FILL = vec3(0.78, 0.10, 0.62);
+const vec3 HALF = vec3(-0.195, 0.336, 0.921);
+
+void main() {
+  vec3 n = normalize(vNormal);
+  float key = max(dot(n, KEY), 0.0);
+  float fill = max(dot(n, FILL), 0.0);
+  float shine = pow(max(dot(n, HALF), 0.0), 24.0);
+  colour = vec4(vColour * (0.34 + 0.62 * key + 0.18 * fill) + 0.07 * shine, 1.0);
+}
+`;
+
+export const TRAVEL_VERTEX = /* glsl */ `${PULL}
+uniform vec3 uTravel;
+uniform vec3 uWipe;
+out vec3 vColour;
+
+void main() {
+  int segment = gl_VertexID >> 1;
+  uvec4 own = vertexAt(segment + ${LEAD_TEXELS});
+  vColour = (own.z & WIPE) != 0u ? uWipe : uTravel;
+  gl_Position = NOWHERE;
+  if ((own.z & NOT_LAID) != TRAVEL) return;
+  uvec4 v = (gl_VertexID & 1) == 1 ? own : vertexAt(segment + ${LEAD_TEXELS - 1});
+  gl_Position = projectionMatrix * (viewMatrix * vec4(placeOf(v), 1.0));
+}
+`;
+
+export const MARKER_VERTEX = /* glsl */ `${PULL}
+uniform uint uMarkers;
+uniform float uMarkerPx;
+uniform vec3 uRetract;
+uniform vec3 uUnretract;
+uniform vec3 uSeam;
+out vec3 vColour;
+
+void main() {
+  uvec4 own = vertexAt(gl_VertexID + ${LEAD_TEXELS});
+  uint kind = own.z & uMarkers;
+  vColour = (kind & ${FLAGS.seam}u) != 0u ? uSeam : (kind & ${FLAGS.retract}u) != 0u ? uRetract : uUnretract;
+  gl_PointSize = uMarkerPx;
+  gl_Position = NOWHERE;
+  if (kind == 0u) return;
+  vec4 eye = viewMatrix * vec4(placeOf(own), 1.0);
+  // In front of the bead that it marks.
+  eye.xyz *= 1.0 - 0.4 / max(length(eye.xyz), 1.0);
+  gl_Position = projectionMatrix * eye;
+}
+`;
+
+export const FLAT_FRAGMENT = /* glsl */ `
+precision highp float;
+in vec3 vColour;
+out vec4 colour;
+void main() { colour = vec4(vColour, 1.0); }
+`;
+
+/** Lines and plates with their own corners. */
+export const FLAT_VERTEX = /* glsl */ `
+precision highp float;
+in vec3 position;
+uniform mat4 viewMatrix;
+uniform mat4 projectionMatrix;
+uniform vec3 uColour;
+out vec3 vColour;
+void main() {
+  vColour = uColour;
+  gl_Position = projectionMatrix * (viewMatrix * vec4(position, 1.0));
+}
+`;
+
+/** A picture over the whole view. */
+export const COPY_VERTEX = /* glsl */ `
+precision highp float;
+out vec2 vAt;
+void main() {
+  vAt = vec2(float((gl_VertexID << 1) & 2), float(gl_VertexID & 2));
+  gl_Position = vec4(vAt * 2.0 - 1.0, 0.0, 1.0);
+}
+`;
+
+export const COPY_FRAGMENT = /* glsl */ `
+precision highp float;
+uniform sampler2D uPicture;
+in vec2 vAt;
+out vec4 colour;
+void main() { colour = vec4(texture(uPicture, vAt).rgb, 1.0); }
+`;

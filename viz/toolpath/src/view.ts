@@ -1,0 +1,347 @@
+/**
+ * The 3D view of a toolpath: takes a canvas and typed arrays.
+ *
+ * Does: keeps the vertices, the layers, the camera and what is shown, and draws when something changed.
+ * Does not know: the page, files, printers, pointers; all of that arrives through its methods. Units: mm, CSS pixels,
+ * vertex and layer indices.
+ */
+import { Scene } from 'three';
+import { type Bed, bedBox, BedObjects, isBed } from './bed';
+import { type BoxMm, type CameraState, DEFAULT_CAMERA, FIELD_OF_VIEW, fit, orbit, pan, unionOf, zoom } from './camera';
+import { VertexStore } from './chunks';
+import { type Drawn, FrameLoop, type FrameReport, type Painter, realmClock } from './frames';
+import { type Layer, LayerList, type VertexRange } from './layers';
+import { featureMask, PALETTES, type Palette, type Theme } from './palette';
+import { ALL_PRINTED, type BeadShape, PathObjects } from './path';
+import { Stage, type Surface } from './stage';
+import type { CssPx, LayerIndex, Ms, VertexIndex } from './units';
+import { type FeatureName, FLAGS, type VertexHeader } from './vertex';
+
+/** What is drawn of the file; {@link ToolpathView.show} changes the members that are given. */
+export interface Shown {
+  /** Both included. */
+  readonly layerFrom: LayerIndex;
+  readonly layerTo: LayerIndex;
+  /** The last vertex of the range that is drawn; null: up to the end of `layerTo`. */
+  readonly vertexTo: VertexIndex | null;
+  readonly travel: boolean;
+  readonly retractions: boolean;
+  readonly seams: boolean;
+  readonly hiddenFeatures: readonly FeatureName[];
+}
+
+export interface ViewSizePx {
+  readonly width: CssPx;
+  readonly height: CssPx;
+  /** Device pixels of a CSS pixel. */
+  readonly ratio: number;
+}
+
+/** What the view tells of itself. */
+export interface ViewEvents {
+  onFrame?(report: FrameReport): void;
+  onContextLost?(): void;
+  onContextRestored?(): void;
+}
+
+const SHOW_ALL: Shown = {
+  layerFrom: 0,
+  layerTo: Number.MAX_SAFE_INTEGER,
+  vertexTo: null,
+  travel: false,
+  retractions: false,
+  seams: false,
+  hiddenFeatures: [],
+};
+/** While vertices arrive, the picture follows this often. */
+const GROWTH_FRAME_MS: Ms = 200;
+const EMPTY_BOX: BoxMm = { min: [-50, -50, 0], max: [50, 50, 50] };
+
+/** How far the full picture is. */
+interface Progress {
+  phase: 'beads' | 'lines' | 'done';
+  /** The next vertex of the phase. */
+  at: number;
+  /** The printed limit that the picture was drawn with. */
+  printed: number;
+}
+
+export class ToolpathView {
+  readonly #canvas: HTMLCanvasElement | OffscreenCanvas;
+  readonly #events: ViewEvents;
+  readonly #stage: Stage;
+  readonly #path = new PathObjects();
+  readonly #bedObjects = new BedObjects();
+  readonly #pathScene = new Scene();
+  readonly #bedScene = new Scene();
+  readonly #loop: FrameLoop;
+  #store: VertexStore | null = null;
+  #layers = new LayerList();
+  #bed: Bed | null = null;
+  #camera: CameraState = DEFAULT_CAMERA;
+  #palette: Palette = PALETTES.light;
+  #shown: Shown = SHOW_ALL;
+  #printed = ALL_PRINTED;
+  #progress: Progress = { phase: 'done', at: 0, printed: ALL_PRINTED };
+  #grown: Ms = 0;
+
+  constructor(canvas: HTMLCanvasElement | OffscreenCanvas, size: ViewSizePx, events: ViewEvents = {}) {
+    this.#canvas = canvas;
+    this.#events = events;
+    this.#stage = new Stage(canvas);
+    this.#pathScene.add(this.#path.group);
+    this.#bedScene.add(this.#bedObjects.group);
+    for (const scene of [this.#pathScene, this.#bedScene]) scene.matrixWorldAutoUpdate = false;
+    canvas.addEventListener('webglcontextlost', this.#onLost);
+    canvas.addEventListener('webglcontextrestored', this.#onRestored);
+    this.#loop = new FrameLoop(this.#painter(), realmClock(), (report) => events.onFrame?.(report));
+    this.setTheme('light');
+    this.resize(size);
+  }
+
+  get vertexCount(): number {
+    return this.#store?.count ?? 0;
+  }
+
+  get camera(): CameraState {
+    return this.#camera;
+  }
+
+  /** Draws this bed; one without an area, or null, draws none. */
+  setBed(bed: Bed | null): void {
+    this.#bed = bed && isBed(bed) ? bed : null;
+    if (this.#bed) this.#bedObjects.set(this.#bed);
+    else this.#bedObjects.clear();
+    this.#bedObjects.palette = this.#palette;
+    this.#loop.moved();
+  }
+
+  /** A new file: what was there goes. */
+  begin(header: VertexHeader): void {
+    this.#path.clear();
+    this.#store = new VertexStore(header);
+    this.#layers = new LayerList();
+    this.#path.header = header;
+    this.#printed = ALL_PRINTED;
+    this.#shown = { ...this.#shown, layerFrom: 0, layerTo: SHOW_ALL.layerTo, vertexTo: null };
+    this.#grown = performance.now();
+    this.#loop.moved();
+  }
+
+  /** The next vertices of the file, four words each; the array is copied. */
+  append(vertices: Uint32Array): void {
+    if (!this.#store) return;
+    this.#store.append(vertices);
+    const now = performance.now();
+    if (now - this.#grown < GROWTH_FRAME_MS) return;
+    this.#grown = now;
+    this.#loop.moved();
+  }
+
+  /** The file has no more vertices. */
+  end(): void {
+    this.#loop.moved();
+  }
+
+  /** No file any more. */
+  clear(): void {
+    this.#path.clear();
+    this.#store = null;
+    this.#layers = new LayerList();
+    this.#loop.moved();
+  }
+
+  setLayers(layers: readonly Layer[]): void {
+    this.#layers = new LayerList(layers);
+    this.#loop.moved();
+  }
+
+  show(shown: Partial<Shown>): void {
+    this.#shown = { ...this.#shown, ...shown };
+    this.#loop.moved();
+  }
+
+  /** Vertices before this one are printed, the others still to come; null: no difference is shown. */
+  setPrintedUpTo(vertex: VertexIndex | null): void {
+    const printed = vertex === null ? ALL_PRINTED : Math.min(Math.max(Math.floor(vertex), 0), ALL_PRINTED);
+    if (printed === this.#printed) return;
+    this.#printed = printed;
+    this.#loop.patched();
+  }
+
+  setTheme(theme: Theme): void {
+    this.#palette = PALETTES[theme];
+    this.#path.palette = this.#palette;
+    this.#bedObjects.palette = this.#palette;
+    this.#stage.background = this.#palette.background;
+    this.#loop.moved();
+  }
+
+  orbit(dx: CssPx, dy: CssPx): void {
+    this.#move(orbit(this.#camera, dx, dy));
+  }
+
+  pan(dx: CssPx, dy: CssPx): void {
+    this.#move(pan(this.#camera, dx, dy, this.#stage.size));
+  }
+
+  /** `factor` below 1 comes nearer; what is under `at` (pixels from the middle, y downwards) stays there. */
+  zoom(factor: number, at: readonly [CssPx, CssPx] = [0, 0]): void {
+    this.#move(zoom(this.#camera, factor, this.#stage.size, at));
+  }
+
+  /** The whole part in view, or the bed when there is none; `direction` also turns the camera. */
+  fit(direction?: Pick<CameraState, 'azimuth' | 'elevation'>): void {
+    const from = { ...this.#camera, ...direction };
+    this.#move(fit(from, this.#store?.box() ?? this.#bedBox() ?? EMPTY_BOX, this.#stage.size));
+  }
+
+  resize({ width, height, ratio }: ViewSizePx): void {
+    this.#stage.resize(width, height, ratio);
+    this.#path.setPixels(
+      (2 * Math.tan(FIELD_OF_VIEW / 2)) / (this.#stage.size.height * this.#stage.ratio),
+      this.#stage.ratio,
+    );
+    this.#loop.moved();
+  }
+
+  dispose(): void {
+    this.#loop.pause();
+    this.#canvas.removeEventListener('webglcontextlost', this.#onLost);
+    this.#canvas.removeEventListener('webglcontextrestored', this.#onRestored);
+    this.#path.clear();
+    this.#bedObjects.clear();
+    this.#stage.dispose();
+    this.#store = null;
+  }
+
+  readonly #onLost = (): void => {
+    this.#loop.pause();
+    this.#events.onContextLost?.();
+  };
+
+  readonly #onRestored = (): void => {
+    this.#loop.resume();
+    this.#events.onContextRestored?.();
+  };
+
+  #move(camera: CameraState): void {
+    this.#camera = camera;
+    this.#loop.moved();
+  }
+
+  #bedBox(): BoxMm | null {
+    return this.#bed && bedBox(this.#bed);
+  }
+
+  #range(): VertexRange {
+    const { layerFrom, layerTo, vertexTo } = this.#shown;
+    const whole = this.#layers.range(layerFrom, Math.min(layerTo, this.#layers.count - 1), this.vertexCount);
+    const end = vertexTo === null ? whole.end : Math.min(whole.end, vertexTo + 1);
+    return { first: whole.first, end: Math.max(end, whole.first) };
+  }
+
+  /** Sets camera and uniforms for the picture that is begun. */
+  #prepare(surface: Surface, heightScale: number): void {
+    const { retractions, seams, hiddenFeatures } = this.#shown;
+    const box = unionOf(this.#bedBox(), this.#store?.boxOfAll() ?? null);
+    this.#stage.look(this.#camera, box ?? EMPTY_BOX);
+    this.#path.sync(this.#store?.chunks ?? []);
+    this.#path.features = featureMask(hiddenFeatures);
+    this.#path.markers = (retractions ? FLAGS.retract | FLAGS.unretract : 0) | (seams ? FLAGS.seam : 0);
+    this.#path.printed = this.#printed;
+    this.#path.heightScale = heightScale;
+    this.#stage.clear(surface);
+    this.#stage.draw(surface, this.#bedScene);
+  }
+
+  #beads(surface: Surface, ranges: readonly VertexRange[], shape: BeadShape, stride: number): void {
+    const parts = ranges.flatMap((range) => this.#store?.split(range) ?? []);
+    if (parts.length === 0) return;
+    this.#path.showBeads(parts.map((range) => ({ range, shape, stride })));
+    this.#stage.draw(surface, this.#pathScene);
+  }
+
+  #lines(surface: Surface, range: VertexRange): void {
+    const { travel, retractions, seams } = this.#shown;
+    const parts = this.#store?.split(range) ?? [];
+    if (parts.length === 0) return;
+    this.#path.showLines(parts, { travels: travel, markers: retractions || seams });
+    this.#stage.draw(surface, this.#pathScene);
+  }
+
+  #linesShown(): boolean {
+    const { travel, retractions, seams } = this.#shown;
+    return travel || retractions || seams;
+  }
+
+  #painter(): Painter {
+    return {
+      fullSegments: () => {
+        const { first, end } = this.#range();
+        return (end - first) * (this.#linesShown() ? 2 : 1);
+      },
+      drawQuick: (budget) => this.#drawQuick(budget),
+      drawSlice: (budget, restart) => this.#drawSlice(budget, restart),
+      patch: () => this.#patch(),
+      fence: () => this.#stage.fence(),
+    };
+  }
+
+  #drawQuick(budget: number): number {
+    const range = this.#range();
+    const { ranges, layerStep, stride } = this.#layers.reduced(range, budget);
+    this.#prepare('canvas', layerStep);
+    this.#beads('canvas', ranges, 'body', stride);
+    const segments = ranges.reduce((sum, { first, end }) => sum + end - first, 0) / stride;
+    if (this.#linesShown() && range.end - range.first < budget) this.#lines('canvas', range);
+    return segments;
+  }
+
+  #drawSlice(budget: number, restart: boolean): Drawn {
+    const range = this.#range();
+    const progress = this.#progress;
+    if (restart) {
+      this.#prepare('picture', 1);
+      this.#progress = { phase: 'beads', at: range.first, printed: this.#printed };
+      return this.#continue(this.#progress, range, budget);
+    }
+    return this.#continue(progress, range, budget);
+  }
+
+  #continue(progress: Progress, range: VertexRange, budget: number): Drawn {
+    let left = Math.max(budget, 1);
+    let segments = 0;
+    this.#path.printed = progress.printed;
+    while (left > 0 && progress.phase !== 'done') {
+      const part = { first: progress.at, end: Math.min(progress.at + left, range.end) };
+      const count = Math.max(part.end - part.first, 0);
+      if (progress.phase === 'beads') this.#beads('picture', [part], 'whole', 1);
+      else this.#lines('picture', part);
+      segments += count;
+      left -= Math.max(count, 1);
+      progress.at = part.end;
+      if (progress.at < range.end) continue;
+      progress.phase = progress.phase === 'beads' && this.#linesShown() ? 'lines' : 'done';
+      progress.at = range.first;
+    }
+    const complete = progress.phase === 'done';
+    if (complete) this.#stage.present();
+    if (complete && progress.printed !== this.#printed) this.#loop.patched();
+    return { segments, complete };
+  }
+
+  /** Draws what was printed since the full picture over it: same places, same depths, other colours. */
+  #patch(): boolean {
+    const from = this.#progress.printed;
+    const to = this.#printed;
+    if (to === ALL_PRINTED || from === ALL_PRINTED || to < from) return false;
+    const range = this.#range();
+    const part = { first: Math.max(from, range.first), end: Math.min(to, range.end) };
+    this.#path.printed = to;
+    if (part.end > part.first) this.#beads('picture', [part], 'whole', 1);
+    this.#progress.printed = to;
+    this.#stage.present();
+    return true;
+  }
+}
