@@ -7,16 +7,13 @@
 //
 // Installs the Rust toolchain of rust-toolchain.toml and the npm packages of package-lock.json, nothing else.
 // Plain Node, built-ins only: it has to run before anything is installed.
-import { spawnSync } from 'node:child_process';
-import { createHash } from 'node:crypto';
-import { existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
-import { dirname, join } from 'node:path';
-import { fileURLToPath } from 'node:url';
+import { join } from 'node:path';
 
+import { setUp } from './lib/setup.mjs';
 import { runSteps } from './lib/steps.mjs';
-import { advice, has, installArguments, isInstalled, missing, readToolchain } from './lib/toolchain.mjs';
+import { root } from './lib/target.mjs';
+import { advice, has } from './lib/toolchain.mjs';
 
-const root = dirname(dirname(fileURLToPath(import.meta.url)));
 /** Cargo's parallel jobs where the machine is shared: more run out of memory while linking. */
 const CI_JOBS = '2';
 
@@ -24,8 +21,11 @@ const nodeTests = (...files) => [
   process.execPath, '--test', '--test-reporter=spec', ...files.map((file) => join('scripts', 'tests', file)),
 ];
 
+/** A program of an npm package. */
+const packaged = (name, ...args) => [process.execPath, join('node_modules', ...name.split('/')), ...args];
+
 const steps = [
-  { name: 'scripts', commands: [nodeTests('steps.test.mjs', 'toolchain.test.mjs')] },
+  { name: 'scripts', commands: [nodeTests('steps.test.mjs', 'toolchain.test.mjs', 'server.test.mjs')] },
   { name: 'format', commands: [['cargo', 'fmt', '--all', '--check']] },
   { name: 'layers', commands: [['cargo', 'xtask', 'layers']] },
   {
@@ -52,6 +52,18 @@ const steps = [
     needs: ['release build'],
     commands: [['cargo', 'xtask', 'wasm'], nodeTests('wasm.test.mjs')],
   },
+  { name: 'biome', commands: [packaged('@biomejs/biome/bin/biome', 'check', '--error-on-warnings')] },
+  {
+    name: 'page types',
+    needs: ['WebAssembly equals native'],
+    commands: ['tsconfig.json', 'tsconfig.node.json'].map((file) => packaged('typescript/bin/tsc', '--noEmit', '--project', join('web', file))),
+  },
+  { name: 'page tests', commands: [packaged('vitest/vitest.mjs', 'run', '--root', 'web')] },
+  {
+    name: 'page build',
+    needs: ['WebAssembly equals native'],
+    commands: [packaged('vite/bin/vite.js', 'build', 'web')],
+  },
   {
     name: 'instructions a step',
     needs: ['release build'],
@@ -65,53 +77,17 @@ const steps = [
   },
 ];
 
-/** Runs a command with its output shown; true when it succeeded. */
-function shown(program, args) {
-  console.log(`$ ${[program, ...args].join(' ')}`);
-  const shell = process.platform === 'win32';
-  return spawnSync(program, args, { cwd: root, stdio: 'inherit', shell }).status === 0;
-}
-
-function setUpRust() {
-  const toolchain = readToolchain(readFileSync(join(root, 'rust-toolchain.toml'), 'utf8'));
-  if (shown('rustup', installArguments(toolchain))) return true;
-  if (isInstalled(toolchain)) {
-    console.log(`rustup could not look for news; Rust ${toolchain.channel} is complete, so it goes on`);
-    return true;
-  }
-  console.error(`rustup could not install Rust ${toolchain.channel}: is the network there?`);
-  return false;
-}
-
-/** `npm ci`, unless there is nothing to install or the lock file is the one that was installed last. */
-function setUpNpm() {
-  const lock = readFileSync(join(root, 'package-lock.json'), 'utf8');
-  if (Object.keys(JSON.parse(lock).packages).length <= 1) return true;
-  const stamp = join(root, 'node_modules', '.stepcast-lock');
-  const digest = createHash('sha256').update(lock).digest('hex');
-  if (existsSync(stamp) && readFileSync(stamp, 'utf8') === digest) return true;
-  if (!shown('npm', ['ci', '--no-audit', '--no-fund'])) return false;
-  mkdirSync(dirname(stamp), { recursive: true });
-  writeFileSync(stamp, digest);
-  return true;
-}
-
 async function main(words) {
   if (words.includes('--list')) {
     for (const step of steps) console.log(step.name);
     return true;
-  }
-  const lacking = missing();
-  if (lacking.length > 0) {
-    console.error(`Missing on this machine:\n${lacking.map((line) => `  ${line}`).join('\n')}`);
-    return false;
   }
   const chosen = steps.filter((step) => words.length === 0 || words.some((word) => step.name.includes(word)));
   if (chosen.length === 0) {
     console.error(`no step is named like ${words.join(', ')}; npm test -- --list names them`);
     return false;
   }
-  if (!setUpRust() || !setUpNpm()) return false;
+  if (!setUp()) return false;
   const env = { ...process.env };
   if (env.CI) env.CARGO_BUILD_JOBS ??= CI_JOBS;
   return runSteps(chosen, { cwd: root, env });

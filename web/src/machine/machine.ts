@@ -1,0 +1,123 @@
+// A connection as the worker holds it: the session, the job's file, and what the page is told of both.
+//
+// The loops (realtime.ts, lockstep.ts) give it bytes and time; it gives them bytes and the next wake-up. Knows neither
+// clocks nor ports.
+import type { Seconds } from '../units';
+import { Feeder } from './feeder';
+import type { FromMachine, MachineEvent, Trouble, Wish } from './protocol';
+import type { Session } from './session';
+import { fileUnreadable } from './troubles';
+
+/** Events that wait to be told; the oldest go first beyond that, and the page is told how many. */
+const EVENTS_MAX = 2000;
+
+export class Machine {
+  readonly session: Session;
+  readonly #tell: (message: FromMachine) => void;
+  readonly #lineErrors: () => number;
+  #feeder: Feeder | undefined;
+  #starting = false;
+  #events: MachineEvent[] = [];
+  #dropped = 0;
+
+  constructor(session: Session, tell: (message: FromMachine) => void, lineErrors: () => number) {
+    this.session = session;
+    this.#tell = tell;
+    this.#lineErrors = lineErrors;
+  }
+
+  receive(bytes: Uint8Array, now: Seconds): void {
+    this.session.receive(bytes, now);
+  }
+
+  /** Does what is due: bytes for the port, and the events that came of it. */
+  poll(now: Seconds): Uint8Array<ArrayBuffer> {
+    this.#feed(now);
+    const bytes = this.session.poll(now);
+    this.#collect();
+    return bytes;
+  }
+
+  #feed(now: Seconds): void {
+    const feeder = this.#feeder;
+    if (!feeder) return;
+    feeder.feed();
+    if (feeder.failure === undefined) return;
+    // What has been sent is carried out, then the machine waits where it is.
+    this.#feeder = undefined;
+    this.session.wish({ kind: 'pause' }, now);
+    this.#push({ kind: 'trouble', trouble: fileUnreadable(feeder.failure) });
+  }
+
+  /** Waits for the job's file where the session wants more of it than has been read. */
+  async catchUp(): Promise<void> {
+    while (this.#feeder?.isBehind) await this.#feeder.refill();
+  }
+
+  get isBehind(): boolean {
+    return this.#feeder?.isBehind ?? false;
+  }
+
+  #push(event: MachineEvent): void {
+    this.#events.push(event);
+    if (this.#events.length > EVENTS_MAX) {
+      this.#events.shift();
+      this.#dropped += 1;
+    }
+  }
+
+  #collect(): void {
+    for (const event of this.session.takeEvents()) {
+      this.#push(event);
+      if (event.kind === 'done' || event.kind === 'cancelled') this.#dropJob();
+      else if (event.kind === 'phase' && event.phase !== 'ready') this.#dropJob();
+    }
+  }
+
+  #dropJob(): void {
+    void this.#feeder?.close();
+    this.#feeder = undefined;
+  }
+
+  /** Tells the page what happened since last time, and how things are. */
+  tell(now: Seconds): void {
+    if (this.#dropped > 0) this.#events.push({ kind: 'dropped', count: this.#dropped });
+    this.#dropped = 0;
+    if (this.#events.length > 0) this.#tell({ kind: 'events', events: this.#events });
+    this.#events = [];
+    const snapshot = this.session.snapshot(now);
+    const link = snapshot.link && { ...snapshot.link, lineErrors: this.#lineErrors() };
+    this.#tell({ kind: 'snapshot', snapshot: { ...snapshot, link } });
+  }
+
+  wish(wish: Wish, now: Seconds): Trouble | null {
+    const trouble = this.session.wish(wish, now);
+    this.#collect();
+    return trouble;
+  }
+
+  /** Starts a print. `now` is asked for once the file is open. */
+  async print(file: Blob, confirmedLines: readonly number[], now: () => Seconds): Promise<Trouble | null> {
+    if (this.#starting) return null;
+    this.#starting = true;
+    try {
+      const feeder = await Feeder.open(file, this.session);
+      const trouble =
+        feeder.failure === undefined
+          ? this.session.startJob(confirmedLines, now())
+          : fileUnreadable(feeder.failure);
+      if (trouble) await feeder.close();
+      else this.#feeder = feeder;
+      return trouble;
+    } catch (error) {
+      return fileUnreadable(error);
+    } finally {
+      this.#starting = false;
+    }
+  }
+
+  free(): void {
+    this.#dropJob();
+    this.session.free();
+  }
+}

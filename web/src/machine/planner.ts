@@ -1,0 +1,243 @@
+// The planner's session and virtual printer for the machine worker: the generated WebAssembly behind the page's types.
+// The one place that knows the planner's messages about machines.
+import type { JobRequest } from '../bindings/JobRequest';
+import type { PrinterError } from '../bindings/PrinterError';
+import type { Snapshot as PlannerSnapshot } from '../bindings/Snapshot';
+import type { UiEvent } from '../bindings/UiEvent';
+import type { UiRequest } from '../bindings/UiRequest';
+import initialise, { PrinterSession, VirtualPrinter } from '../bindings/wasm/planner_wasm.js';
+import { celsius, mm, type Seconds, seconds, share } from '../units';
+import type { Axis, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
+import type { Session, SimulatedPrinter } from './session';
+
+/** Speeds of moves by hand, mm/s; the machine's own limits hold besides. */
+const JOG_SPEED: Record<Axis, number> = { X: 100, Y: 100, Z: 10 };
+const EXTRUDE_SPEED = 3;
+const AXES = ['X', 'Y', 'Z'] as const;
+
+const lower = (axis: Axis): 'x' | 'y' | 'z' => axis.toLowerCase() as 'x' | 'y' | 'z';
+
+export interface Planner {
+  /** Throws what `asTrouble` understands where the machine's file has errors. */
+  openSession(config: string, now: Seconds): Session;
+  powerUp(config: string, board: string, seed: number, faults: string): SimulatedPrinter;
+  /** The planner's error, or null where something else was thrown. */
+  asTrouble(error: unknown): Trouble | null;
+}
+
+export async function loadPlanner(): Promise<Planner> {
+  await initialise();
+  return {
+    openSession: (config, now) => new WasmSession(config, now),
+    powerUp: (config, board, seed, faults) => new WasmPrinter(config, board, seed, faults),
+    asTrouble: plannerTrouble,
+  };
+}
+
+const inWords = (error: PrinterError): Trouble => ({
+  code: error.code,
+  line: error.line,
+  happened: error.what_happened,
+  safe: error.what_is_safe,
+  todo: error.what_to_do,
+});
+
+/** Errors are thrown with the catalogue's entry as JSON in their message. */
+export function plannerTrouble(error: unknown): Trouble | null {
+  const text = error instanceof Error ? error.message : typeof error === 'string' ? error : '';
+  try {
+    const entry = JSON.parse(text) as PrinterError;
+    return typeof entry.code === 'string' ? inWords(entry) : null;
+  } catch {
+    return null;
+  }
+}
+
+/** Runs what may be refused. */
+function refusal(act: () => void): Trouble | null {
+  try {
+    act();
+    return null;
+  } catch (error) {
+    const trouble = plannerTrouble(error);
+    if (trouble) return trouble;
+    throw error;
+  }
+}
+
+function toRequest(wish: Wish): UiRequest {
+  switch (wish.kind) {
+    case 'gcode':
+      return { type: 'gcode', text: wish.text };
+    case 'home':
+      return { type: 'home', axes: wish.axes.map(lower) };
+    case 'jog':
+      return {
+        type: 'jog',
+        axis: lower(wish.axis),
+        distance_mm: wish.distance,
+        speed_mm_s: JOG_SPEED[wish.axis],
+      };
+    case 'extrude':
+      return { type: 'extrude', length_mm: wish.length, speed_mm_s: EXTRUDE_SPEED };
+    case 'temperature':
+      return { type: 'set-temperature', heater: wish.heater, target_c: wish.target };
+    case 'fan':
+      return { type: 'set-fan', speed: wish.value };
+    case 'speed-factor':
+      return { type: 'set-speed-factor', factor: wish.value };
+    case 'flow-factor':
+      return { type: 'set-flow-factor', factor: wish.value };
+    default:
+      return { type: wish.kind };
+  }
+}
+
+/** An event in the page's words; null for what the snapshot tells as well. */
+function fromEvent(event: UiEvent): MachineEvent | null {
+  switch (event.type) {
+    case 'phase':
+      return { kind: 'phase', phase: event.phase };
+    case 'identified':
+      return { kind: 'identified', version: event.version, mcu: event.mcu };
+    case 'homed':
+      return { kind: 'homed', axis: AXES[event.axis] ?? 'X', position: mm(event.position_mm) };
+    case 'message':
+      return { kind: 'message', text: event.text };
+    case 'notice':
+      return {
+        kind: 'notice',
+        line: event.finding.line,
+        severity: event.finding.severity,
+        text: event.finding.message,
+      };
+    case 'paused':
+    case 'resumed':
+      return { kind: event.type };
+    case 'job-done':
+      return { kind: 'done' };
+    case 'job-cancelled':
+      return { kind: 'cancelled' };
+    case 'error':
+      return { kind: 'trouble', trouble: inWords(event.error) };
+    case 'dropped':
+      return { kind: 'dropped', count: Number(event.count) };
+    case 'temperature':
+    case 'progress':
+      return null;
+  }
+}
+
+type Place = readonly [number, number, number, number];
+const place = ([x, y, z, e]: Place): NonNullable<Snapshot['position']> => [mm(x), mm(y), mm(z), mm(e)];
+
+function fromSnapshot(now: PlannerSnapshot): Snapshot {
+  const position = now.live_mm ?? now.position_mm;
+  const { link } = now;
+  return {
+    phase: now.phase,
+    heaters: now.temperatures.map((heater) => ({
+      name: heater.heater,
+      temperature: celsius(heater.temperature_c),
+      target: celsius(heater.target_c),
+      duty: share(heater.duty),
+    })),
+    position: position && place(position),
+    homed: now.homed,
+    job: now.job.status,
+    line: now.job.line,
+    elapsed: seconds(now.job.elapsed_s),
+    queued: now.queued_s === null ? null : seconds(now.queued_s),
+    speedFactor: share(now.speed_factor),
+    flowFactor: share(now.flow_factor),
+    fan: share(now.fan),
+    link: link && {
+      bytesSent: Number(link.sent_bytes),
+      bytesReceived: Number(link.received_bytes),
+      bytesRetransmitted: Number(link.retransmitted_bytes),
+      timeouts: Number(link.timeouts),
+      roundTrip: link.round_trip_s === null ? null : seconds(link.round_trip_s),
+      lineErrors: 0,
+    },
+  };
+}
+
+class WasmSession implements Session {
+  readonly #inner: PrinterSession;
+
+  constructor(config: string, now: Seconds) {
+    this.#inner = new PrinterSession(config, now);
+  }
+
+  receive(bytes: Uint8Array, now: Seconds): void {
+    this.#inner.receive(bytes, now);
+  }
+
+  poll(now: Seconds): Uint8Array<ArrayBuffer> {
+    return this.#inner.poll(now) as Uint8Array<ArrayBuffer>;
+  }
+
+  wake(): Seconds {
+    return seconds(this.#inner.wake_s());
+  }
+
+  takeEvents(): MachineEvent[] {
+    const text = this.#inner.take_events();
+    if (text === '[]') return [];
+    const events = JSON.parse(text) as UiEvent[];
+    return events.flatMap((event) => fromEvent(event) ?? []);
+  }
+
+  wish(wish: Wish, now: Seconds): Trouble | null {
+    return refusal(() => this.#inner.request(JSON.stringify(toRequest(wish)), now));
+  }
+
+  startJob(confirmedLines: readonly number[], now: Seconds): Trouble | null {
+    const request: JobRequest = { confirmed_lines: [...confirmedLines], confirm_all: false };
+    return refusal(() => this.#inner.start_job(JSON.stringify(request), now));
+  }
+
+  jobWants(): number {
+    return this.#inner.job_wants();
+  }
+
+  jobFeed(bytes: Uint8Array): void {
+    this.#inner.job_feed(bytes);
+  }
+
+  jobEnd(): void {
+    this.#inner.job_end();
+  }
+
+  snapshot(now: Seconds): Snapshot {
+    return fromSnapshot(JSON.parse(this.#inner.snapshot(now)) as PlannerSnapshot);
+  }
+
+  free(): void {
+    this.#inner.free();
+  }
+}
+
+class WasmPrinter implements SimulatedPrinter {
+  readonly #inner: VirtualPrinter;
+
+  constructor(config: string, board: string, seed: number, faults: string) {
+    this.#inner = new VirtualPrinter(config, board, seed, faults);
+  }
+
+  now(): Seconds {
+    return seconds(this.#inner.now_s());
+  }
+
+  write(bytes: Uint8Array): void {
+    this.#inner.write(bytes);
+  }
+
+  runUntil(until: Seconds): Uint8Array<ArrayBuffer> {
+    return this.#inner.run_until_s(until) as Uint8Array<ArrayBuffer>;
+  }
+
+  free(): void {
+    this.#inner.free();
+  }
+}

@@ -1,0 +1,121 @@
+// What the page and the machine worker say to each other, and the machine as the page sees it.
+// Shapes only. Values that come from the planner are described here in the page's own words; machine/planner.ts
+// makes them from the planner's.
+import type { PortId } from '../transport/web_serial';
+import type { Celsius, Mm, Seconds, Share } from '../units';
+
+/** Something that went wrong, in the words of the catalogue: what happened, what is safe, what to do. */
+export interface Trouble {
+  readonly code: string;
+  readonly line: number | null;
+  readonly happened: string;
+  readonly safe: string;
+  readonly todo: string;
+}
+
+export type Axis = 'X' | 'Y' | 'Z';
+export type HeaterName = 'extruder' | 'heater_bed';
+
+export interface HeaterState {
+  readonly name: HeaterName;
+  readonly temperature: Celsius;
+  /** 0 is off. */
+  readonly target: Celsius;
+  readonly duty: Share;
+}
+
+/** The connection to the board, from the first byte on. */
+export type Phase =
+  | 'identifying'
+  | 'synchronising'
+  | 'restarting'
+  | 'configuring'
+  | 'ready'
+  | 'shutdown'
+  | 'failed';
+
+export type JobStatus = 'none' | 'printing' | 'pausing' | 'paused' | 'ending';
+
+export interface LinkCounts {
+  readonly bytesSent: number;
+  readonly bytesReceived: number;
+  readonly bytesRetransmitted: number;
+  readonly timeouts: number;
+  readonly roundTrip: Seconds | null;
+  readonly lineErrors: number;
+}
+
+/** The machine now. Sent several times a second. */
+export interface Snapshot {
+  readonly phase: Phase;
+  readonly heaters: readonly HeaterState[];
+  /** X, Y, Z, E where the head is now, as far as that is known. */
+  readonly position: readonly [Mm, Mm, Mm, Mm] | null;
+  readonly homed: readonly [boolean, boolean, boolean];
+  readonly job: JobStatus;
+  /** The line of the last move that has been made. */
+  readonly line: number;
+  /** Print time made so far. */
+  readonly elapsed: Seconds;
+  /** Motion that the board has and has not made yet; null while none is being made. */
+  readonly queued: Seconds | null;
+  readonly speedFactor: Share;
+  readonly flowFactor: Share;
+  readonly fan: Share;
+  readonly link: LinkCounts | null;
+}
+
+/** What the page is told in words, in the order in which it happened. */
+export type MachineEvent =
+  | { readonly kind: 'phase'; readonly phase: Phase }
+  | { readonly kind: 'identified'; readonly version: string; readonly mcu: string }
+  | { readonly kind: 'message'; readonly text: string }
+  | { readonly kind: 'notice'; readonly line: number; readonly severity: string; readonly text: string }
+  | { readonly kind: 'homed'; readonly axis: Axis; readonly position: Mm }
+  | { readonly kind: 'paused' | 'resumed' | 'done' | 'cancelled' }
+  | { readonly kind: 'trouble'; readonly trouble: Trouble }
+  | { readonly kind: 'dropped'; readonly count: number };
+
+export type Wish =
+  | { readonly kind: 'gcode'; readonly text: string }
+  | { readonly kind: 'home'; readonly axes: readonly Axis[] }
+  | { readonly kind: 'jog'; readonly axis: Axis; readonly distance: Mm }
+  | { readonly kind: 'extrude'; readonly length: Mm }
+  | { readonly kind: 'temperature'; readonly heater: HeaterName; readonly target: Celsius }
+  | { readonly kind: 'fan' | 'speed-factor' | 'flow-factor'; readonly value: Share }
+  | { readonly kind: 'motors-off' | 'pause' | 'resume' | 'cancel' | 'emergency-stop' | 'firmware-restart' };
+
+export type PortChoice =
+  | { readonly kind: 'serial'; readonly id: PortId; readonly baud: number }
+  | {
+      readonly kind: 'virtual';
+      readonly board: 'rp2040' | 'stm32f103';
+      readonly speed: number;
+      readonly seed: number;
+      readonly faults: string;
+    };
+
+export type ToMachine =
+  | { readonly kind: 'connect'; readonly port: PortChoice; readonly config: string }
+  | { readonly kind: 'disconnect' }
+  | { readonly kind: 'wish'; readonly id: number; readonly wish: Wish }
+  | {
+      readonly kind: 'print';
+      readonly id: number;
+      readonly file: Blob;
+      readonly confirmedLines: readonly number[];
+    }
+  | { readonly kind: 'speed'; readonly speed: number };
+
+export type FromMachine =
+  /** The planner is loaded: connections can be made. */
+  | { readonly kind: 'loaded' }
+  | { readonly kind: 'opened' }
+  /** The connection is over; `trouble` says why, where the user did not end it. */
+  | { readonly kind: 'closed'; readonly trouble: Trouble | null }
+  | { readonly kind: 'snapshot'; readonly snapshot: Snapshot }
+  | { readonly kind: 'events'; readonly events: readonly MachineEvent[] }
+  /** What came of a wish or of a print's start. */
+  | { readonly kind: 'answer'; readonly id: number; readonly trouble: Trouble | null }
+  /** The worker's clock jumped: the computer slept, or the worker was held up. */
+  | { readonly kind: 'gap'; readonly seconds: Seconds };

@@ -1,0 +1,77 @@
+// The loop between a session and a real port, in real time.
+//
+// Host time is the worker's monotonic clock. Timers are the worker's: a hidden page does not slow them down.
+import type { Transport } from '../transport/transport';
+import type { Seconds } from '../units';
+import type { Machine } from './machine';
+
+/** A wake-up that comes later than this after it was asked for is told: the computer slept or was very busy. */
+const GAP_MIN_S = 1;
+
+export interface LoopOptions {
+  readonly machine: Machine;
+  readonly now: () => Seconds;
+  readonly onGap: (gap: Seconds) => void;
+  /** Bytes as they come, for those who judge what is on the other end. */
+  readonly onBytes: (bytes: Uint8Array) => void;
+}
+
+export class RealTimeLoop {
+  readonly #transport: Transport;
+  readonly #writer: WritableStreamDefaultWriter<Uint8Array<ArrayBuffer>>;
+  readonly #reader: ReadableStreamDefaultReader<Uint8Array<ArrayBuffer>>;
+  readonly #options: LoopOptions;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #stopped = false;
+
+  constructor(transport: Transport, options: LoopOptions) {
+    this.#transport = transport;
+    this.#options = options;
+    this.#writer = transport.writable.getWriter();
+    this.#reader = transport.readable.getReader();
+  }
+
+  start(): void {
+    void this.#read();
+    this.tick();
+  }
+
+  async #read(): Promise<void> {
+    try {
+      for (;;) {
+        const { value, done } = await this.#reader.read();
+        if (done || this.#stopped) return;
+        this.#options.onBytes(value);
+        this.#options.machine.receive(value, this.#options.now());
+        this.tick();
+      }
+    } catch {
+      // The transport tells by `lost` why there is nothing more to read.
+    }
+  }
+
+  /** Lets the session do what is due, now. */
+  readonly tick = (): void => {
+    if (this.#stopped) return;
+    clearTimeout(this.#timer);
+    const { machine, now } = this.#options;
+    const bytes = machine.poll(now());
+    // Errors are told by the transport's `lost`; how much may be under way is bounded by the link's window.
+    if (bytes.byteLength > 0) this.#writer.write(bytes).catch(() => undefined);
+    const wake = machine.session.wake();
+    const delay = Math.max(0, (wake - now()) * 1000);
+    this.#timer = setTimeout(() => {
+      const late = now() - wake;
+      if (late > GAP_MIN_S) this.#options.onGap(late as Seconds);
+      this.tick();
+    }, delay);
+  };
+
+  async stop(): Promise<void> {
+    if (this.#stopped) return;
+    this.#stopped = true;
+    clearTimeout(this.#timer);
+    this.#reader.cancel().catch(() => undefined);
+    await this.#transport.close();
+  }
+}

@@ -1,0 +1,31 @@
+// The planner's session as the worker uses it: the generated class behind the page's own types.
+// Knows no port and no clock: bytes and time are arguments.
+import type { Seconds } from '../units';
+import type { MachineEvent, Snapshot, Trouble, Wish } from './protocol';
+
+export interface Session {
+  receive(bytes: Uint8Array, now: Seconds): void;
+  /** Bytes for the port; may be empty. */
+  poll(now: Seconds): Uint8Array<ArrayBuffer>;
+  /** When `poll` is to be called again if nothing arrives before. */
+  wake(): Seconds;
+  takeEvents(): MachineEvent[];
+  /** Null where the wish is being carried out. */
+  wish(wish: Wish, now: Seconds): Trouble | null;
+  startJob(confirmedLines: readonly number[], now: Seconds): Trouble | null;
+  /** How many bytes of the job's file may be fed now. */
+  jobWants(): number;
+  jobFeed(bytes: Uint8Array): void;
+  jobEnd(): void;
+  snapshot(now: Seconds): Snapshot;
+  free(): void;
+}
+
+/** A printer in this page, with its own virtual time: seconds since it was powered up. */
+export interface SimulatedPrinter {
+  now(): Seconds;
+  write(bytes: Uint8Array): void;
+  /** Lets time pass until `until`, or until bytes come; returns those. */
+  runUntil(until: Seconds): Uint8Array<ArrayBuffer>;
+  free(): void;
+}

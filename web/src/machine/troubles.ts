@@ -1,0 +1,115 @@
+// What can go wrong between the page and the port, in the same three parts as the planner's catalogue.
+// Knows nothing of the protocol; what the planner finds wrong is worded there.
+import type { AnswerKind } from '../transport/answer';
+import { PortError, type PortFailureCode } from '../transport/transport';
+import type { Trouble } from './protocol';
+
+const NOTHING_MOVED = 'Nothing was sent to the printer: it did not move and no heater was switched on.';
+const ON_ITS_OWN =
+  'The printer is on its own: its board switches the heaters off within 3 seconds without orders and stops when its queue of moves is empty. It may have lost its position.';
+
+const trouble = (code: string, happened: string, safe: string, todo: string): Trouble => ({
+  code,
+  line: null,
+  happened,
+  safe,
+  todo,
+});
+
+const PORT: Record<PortFailureCode, readonly [string, string, string]> = {
+  unplugged: [
+    'The printer was unplugged, or its board switched off.',
+    ON_ITS_OWN,
+    'Look at the printer first. Plug it in again and connect; a print does not start again by itself. Home before printing.',
+  ],
+  'port-busy': [
+    'The port could not be opened.',
+    NOTHING_MOVED,
+    'Another program or another tab probably holds it: close slicers, serial monitors and other control panels, then connect again. On Linux your user also needs permission for the port (group dialout or uucp).',
+  ],
+  'port-gone': [
+    'The port is not there any more.',
+    NOTHING_MOVED,
+    'Check the cable and the printer\u2019s power, then choose the port again.',
+  ],
+  'port-error': [
+    'The connection gives nothing but errors.',
+    ON_ITS_OWN,
+    'Check the baud rate, use a shorter cable without a hub, then connect again and home.',
+  ],
+};
+
+const detail = (error: unknown): string => {
+  if (error instanceof PortError) return error.cause === undefined ? '' : detail(error.cause);
+  return error instanceof Error ? error.message : String(error);
+};
+
+/** A port's failure. */
+export function portTrouble(error: unknown): Trouble {
+  const code = error instanceof PortError ? error.code : 'port-error';
+  const [happened, safe, todo] = PORT[code];
+  const text = detail(error);
+  return trouble(code, text ? `${happened} (${text})` : happened, safe, todo);
+}
+
+/** Another tab drives the printer. */
+export const portInUse = (): Trouble =>
+  trouble(
+    'port-in-use',
+    'Another tab of this browser is connected to this printer.',
+    NOTHING_MOVED,
+    'Go on in that tab, or disconnect there first.',
+  );
+
+export const fileUnreadable = (error: unknown): Trouble =>
+  trouble(
+    'file-unreadable',
+    `The file could not be read to its end. (${detail(error)})`,
+    'The moves sent so far are carried out, then the printer pauses with its position known and its heaters as they were.',
+    'Make the file readable again (disk, network drive, permission) and drop it anew; cancel the print that waits.',
+  );
+
+export const plannerMissing = (error: unknown): Trouble =>
+  trouble(
+    'planner-missing',
+    `The planner could not be loaded. (${detail(error)})`,
+    NOTHING_MOVED,
+    'Reload the page. If it stays so, the page was not copied completely, or the browser forbids WebAssembly.',
+  );
+
+export const workerDied = (message: string): Trouble =>
+  trouble(
+    'worker-died',
+    `The part of the page that drives the printer has stopped. (${message})`,
+    ON_ITS_OWN,
+    'Look at the printer, reload the page, connect and home. Please report it with the diagnostic report.',
+  );
+
+const ANSWERS: Partial<Record<AnswerKind, readonly [string, string]>> = {
+  silent: [
+    'The board does not answer at all.',
+    'Check that the printer has power, that this is its port, and for boards with a UART the baud rate. A board that has just been flashed may need a reset.',
+  ],
+  marlin: [
+    'The board answers in text, as Marlin, RepRapFirmware and their relatives do.',
+    'This page drives boards with Klipper\u2019s firmware. Flash Klipper-compatible firmware, or print with a program for that firmware.',
+  ],
+  bootloader: [
+    'A bootloader answers, not a firmware: the board waits to be flashed.',
+    'Flash Klipper-compatible firmware, or press the board\u2019s reset button to start the one it has.',
+  ],
+  text: [
+    'The board answers in text that this page does not know.',
+    'Check that this is the printer\u2019s port, not another device\u2019s. This page drives boards with Klipper\u2019s firmware.',
+  ],
+  noise: [
+    'The board answers, but nothing that can be read.',
+    'The baud rate is probably wrong: 250000 and 115200 are common. Take the one that the firmware was built with.',
+  ],
+};
+
+/** A more exact word for a board that could not be identified, by what it said; null where there is none. */
+export function answerTrouble(answer: AnswerKind, code: string): Trouble | null {
+  const words = ANSWERS[answer];
+  return words ? trouble(code, words[0], NOTHING_MOVED, words[1]) : null;
+}

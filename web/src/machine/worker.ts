@@ -1,0 +1,210 @@
+// The machine worker: owns the port, the session and all timers of a connection, one at a time.
+//
+// Nothing here waits for the page. A Web Lock is held from before the port is opened to after it is closed, so that
+// one tab has a printer; a tab that holds a lock is not frozen either.
+import { ANSWER_BYTES_MAX, classify } from '../transport/answer';
+import { PortError } from '../transport/transport';
+import { find, openSerial } from '../transport/web_serial';
+import { type Seconds, seconds } from '../units';
+import { LockstepLoop } from './lockstep';
+import { Machine } from './machine';
+import { loadPlanner, type Planner } from './planner';
+import type { FromMachine, PortChoice, ToMachine, Trouble } from './protocol';
+import { RealTimeLoop } from './realtime';
+import { answerTrouble, plannerMissing, portInUse, portTrouble, workerDied } from './troubles';
+
+/** How often the page is told how things are, in ms. */
+const TELL_MS = 100;
+/** Gaps between tellings longer than this are told. */
+const UNIDENTIFIED = new Set(['board-silent', 'wrong-firmware']);
+
+interface Connection {
+  readonly machine: Machine;
+  readonly now: () => Seconds;
+  readonly tick: () => void;
+  readonly setSpeed: (speed: number) => void;
+  /** Ends the connection; the lock is let go after it. */
+  readonly end: (trouble: Trouble | null) => Promise<void>;
+}
+
+const scope = self as unknown as { postMessage(message: FromMachine): void };
+const realNow = (): Seconds => seconds(performance.now() / 1000);
+
+let planner: Planner | undefined;
+let connection: Connection | undefined;
+let opening: { cancelled: boolean } | undefined;
+
+const tell = (message: FromMachine): void => scope.postMessage(message);
+
+/** What the port's board said before it was identified, to judge what it is. */
+class FirstBytes {
+  #bytes: number[] = [];
+
+  take(bytes: Uint8Array): void {
+    for (const byte of bytes.subarray(0, ANSWER_BYTES_MAX - this.#bytes.length)) this.#bytes.push(byte);
+  }
+
+  /** The message with a more exact reason where the board could not be identified. */
+  explain(message: FromMachine): FromMachine {
+    if (message.kind !== 'events') return message;
+    const events = message.events.map((event) => {
+      if (event.kind !== 'trouble' || !UNIDENTIFIED.has(event.trouble.code)) return event;
+      const trouble = answerTrouble(classify(Uint8Array.from(this.#bytes)), event.trouble.code);
+      return trouble ? { ...event, trouble } : event;
+    });
+    return { ...message, events };
+  }
+}
+
+/** Runs `body` with the lock, or not at all. */
+async function withLock(name: string, body: () => Promise<void>): Promise<boolean> {
+  return await navigator.locks.request(name, { ifAvailable: true }, async (lock) => {
+    if (!lock) return false;
+    await body();
+    return true;
+  });
+}
+
+/** The loop is up: tells the page, until the connection is over. */
+function hold(
+  make: (over: (trouble: Trouble | null) => void) => Omit<Connection, 'end'> & { stop: () => Promise<void> },
+): Promise<void> {
+  return new Promise((resolve) => {
+    let over = false;
+    const end = async (trouble: Trouble | null): Promise<void> => {
+      if (over) return;
+      over = true;
+      clearInterval(timer);
+      connection = undefined;
+      await parts.stop();
+      parts.machine.tell(parts.now());
+      parts.machine.free();
+      tell({ kind: 'closed', trouble });
+      resolve();
+    };
+    const parts = make((trouble) => void end(trouble));
+    connection = { ...parts, end };
+    const timer = setInterval(() => parts.machine.tell(parts.now()), TELL_MS);
+    tell({ kind: 'opened' });
+  });
+}
+
+async function connectSerial(
+  loaded: Planner,
+  choice: PortChoice & { kind: 'serial' },
+  config: string,
+): Promise<void> {
+  const port = find(choice.id, await navigator.serial.getPorts());
+  if (!port) throw new PortError('port-gone');
+  const name = `stepcast-port:${choice.id.vendor}:${choice.id.product}:${choice.id.index}`;
+  const held = await withLock(name, async () => {
+    const transport = await openSerial(port, choice.baud);
+    if (opening?.cancelled) {
+      await transport.close();
+      return;
+    }
+    const first = new FirstBytes();
+    await hold((over) => {
+      const session = loaded.openSession(config, realNow());
+      const machine = new Machine(
+        session,
+        (message) => tell(first.explain(message)),
+        () => transport.lineErrors(),
+      );
+      const loop = new RealTimeLoop(transport, {
+        machine,
+        now: realNow,
+        onGap: (gap) => tell({ kind: 'gap', seconds: gap }),
+        onBytes: (bytes) => first.take(bytes),
+      });
+      void transport.lost.then((error) => over(portTrouble(error)));
+      loop.start();
+      return { machine, now: realNow, tick: loop.tick, setSpeed: () => undefined, stop: () => loop.stop() };
+    });
+  });
+  if (!held) tell({ kind: 'closed', trouble: portInUse() });
+}
+
+async function connectVirtual(
+  loaded: Planner,
+  choice: PortChoice & { kind: 'virtual' },
+  config: string,
+): Promise<void> {
+  // Every tab has a printer of its own; the lock only keeps the tab from being frozen.
+  await withLock(`stepcast-virtual:${crypto.randomUUID()}`, () =>
+    hold((over) => {
+      const printer = loaded.powerUp(config, choice.board, choice.seed, choice.faults);
+      const now = (): Seconds => printer.now();
+      const session = loaded.openSession(config, now());
+      const machine = new Machine(session, tell, () => 0);
+      const loop = new LockstepLoop(machine, printer, choice.speed, realNow);
+      loop.start((error) => over(workerDied(String(error))));
+      return {
+        machine,
+        now,
+        tick: loop.tick,
+        setSpeed: (speed) => loop.setSpeed(speed),
+        stop: () => loop.stop(),
+      };
+    }),
+  );
+}
+
+async function connect(message: ToMachine & { kind: 'connect' }): Promise<void> {
+  if (connection || opening) return;
+  opening = { cancelled: false };
+  try {
+    const loaded = await load();
+    if (message.port.kind === 'serial') await connectSerial(loaded, message.port, message.config);
+    else await connectVirtual(loaded, message.port, message.config);
+  } catch (error) {
+    tell({
+      kind: 'closed',
+      trouble: planner ? (planner.asTrouble(error) ?? portTrouble(error)) : plannerMissing(error),
+    });
+  } finally {
+    opening = undefined;
+  }
+}
+
+async function load(): Promise<Planner> {
+  planner ??= await loadPlanner();
+  return planner;
+}
+
+async function answer(
+  id: number,
+  act: (connection: Connection) => Promise<Trouble | null> | Trouble | null,
+): Promise<void> {
+  const current = connection;
+  if (!current) return tell({ kind: 'answer', id, trouble: null });
+  const trouble = await act(current);
+  tell({ kind: 'answer', id, trouble });
+  current.tick();
+}
+
+self.onmessage = ({ data }: MessageEvent<ToMachine>): void => {
+  switch (data.kind) {
+    case 'connect':
+      void connect(data);
+      break;
+    case 'disconnect':
+      if (connection) void connection.end(null);
+      else if (opening) opening.cancelled = true;
+      break;
+    case 'wish':
+      void answer(data.id, ({ machine, now }) => machine.wish(data.wish, now()));
+      break;
+    case 'print':
+      void answer(data.id, ({ machine, now }) => machine.print(data.file, data.confirmedLines, now));
+      break;
+    case 'speed':
+      connection?.setSpeed(data.speed);
+      break;
+  }
+};
+
+load().then(
+  () => tell({ kind: 'loaded' }),
+  (error: unknown) => tell({ kind: 'closed', trouble: plannerMissing(error) }),
+);

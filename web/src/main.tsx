@@ -1,0 +1,21 @@
+// The page's start: the shell first, then the workers, which load the planner.
+import { render } from 'preact';
+import './styles/base.css';
+import './styles/controls.css';
+import './styles/layout.css';
+import './styles/panels.css';
+import { App } from './panel/app';
+import { guardPrint } from './panel/guard';
+import { followProfile } from './panel/machine_summary';
+import { startMachine } from './state/machine';
+import { startPreview } from './state/preview';
+import { loadProfiles } from './state/profiles';
+import { applySettings } from './state/settings';
+
+applySettings();
+const root = document.getElementById('app');
+if (root) render(<App />, root);
+startMachine();
+startPreview();
+guardPrint();
+void loadProfiles().then(followProfile);

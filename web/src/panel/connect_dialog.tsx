@@ -1,0 +1,183 @@
+// Choosing what to connect to: a printer on USB, or the virtual printer in this page.
+import { signal } from '@preact/signals';
+import type { JSX } from 'preact';
+import { useEffect } from 'preact/hooks';
+import { connect, plannerLoaded, refusePort } from '../state/machine';
+import { activeProfile, profiles } from '../state/profiles';
+import { change, SPEED_MAX, settings } from '../state/settings';
+import { identify, type PortId } from '../transport/web_serial';
+import { machineSummary } from './machine_summary';
+import { Button, Choice, Dialog, NumberField } from './parts';
+import { openDialog } from './top_bar';
+
+const HAS_SERIAL = 'serial' in navigator;
+const SPEEDS = [1, 5, 20, SPEED_MAX] as const;
+
+const known = signal<readonly SerialPort[]>([]);
+const chosen = signal<SerialPort | null>(null);
+const notice = signal<string | null>(null);
+
+const hex = (value: number | null): string => (value ?? 0).toString(16).padStart(4, '0');
+
+function nameOf({ vendor, product, index }: PortId): string {
+  const kind = vendor === null ? 'Serial port' : `USB device ${hex(vendor)}:${hex(product)}`;
+  return index > 0 ? `${kind}, number ${index + 1}` : kind;
+}
+
+async function look(): Promise<void> {
+  known.value = await navigator.serial.getPorts();
+  // A known port is offered; when there is only one it is the choice, and still somebody has to press the button.
+  if (chosen.value && known.value.includes(chosen.value)) return;
+  chosen.value = known.value.length === 1 ? (known.value[0] ?? null) : null;
+}
+
+async function choose(): Promise<void> {
+  notice.value = null;
+  try {
+    const picked = await navigator.serial.requestPort();
+    await look();
+    chosen.value = picked;
+  } catch (error) {
+    const name = error instanceof DOMException ? error.name : '';
+    if (name === 'NotFoundError')
+      notice.value =
+        'No port was chosen. If yours is not in the list: is the printer on, and does the cable carry data?';
+    else if (name === 'SecurityError')
+      notice.value =
+        'The browser does not allow this page to use serial ports (a setting or a policy forbids it).';
+    else refusePort(error);
+  }
+}
+
+function go(): void {
+  const { connectTo, baud, speed } = settings.value;
+  const { config } = activeProfile.value;
+  if (connectTo === 'virtual' || !HAS_SERIAL) {
+    connect({ kind: 'virtual', board: 'rp2040', speed, seed: 1, faults: '' }, config);
+  } else if (chosen.value) {
+    connect({ kind: 'serial', id: identify(chosen.value, known.value), baud }, config);
+  }
+  openDialog.value = null;
+}
+
+function Ports(): JSX.Element {
+  const ports = known.value;
+  return (
+    <div class="stack">
+      {ports.length > 0 && (
+        <fieldset class="ports">
+          <legend>Ports that this page may use</legend>
+          {ports.map((port) => (
+            <label key={port} class="check">
+              <input
+                type="radio"
+                name="port"
+                checked={chosen.value === port}
+                onChange={() => (chosen.value = port)}
+              />
+              {nameOf(identify(port, ports))}
+            </label>
+          ))}
+        </fieldset>
+      )}
+      <div class="row wrap">
+        <Button onClick={() => void choose()}>
+          {ports.length > 0 ? 'Choose another port' : 'Choose a port'}
+        </Button>
+      </div>
+      <div role="status">{notice.value && <p class="hint">{notice.value}</p>}</div>
+      <NumberField
+        label="Baud rate"
+        unit="Bd"
+        value={settings.value.baud}
+        min={2400}
+        max={4_000_000}
+        onSet={(baud) => change({ baud: Math.round(baud) })}
+      />
+      <p class="hint">
+        Boards with USB of their own ignore the baud rate; for a UART it is that of the firmware, often
+        250000.
+      </p>
+    </div>
+  );
+}
+
+function Virtual(): JSX.Element {
+  return (
+    <div class="stack">
+      <p>
+        A whole printer inside this page: the same firmware, heaters that warm up, motors that move. Nothing
+        real gets warm. It is built from the machine file in use and is gone when the page is closed.
+      </p>
+      <Choice
+        label="Speed"
+        choices={SPEEDS.map((value) => ({ value, text: value === 1 ? 'Real time' : `up to ${value}×` }))}
+        value={(SPEEDS.find((value) => value === settings.value.speed) ?? 1) as (typeof SPEEDS)[number]}
+        onSet={(speed) => change({ speed })}
+      />
+    </div>
+  );
+}
+
+function obstacle(isSerial: boolean): string | null {
+  if (!plannerLoaded.value) return 'The planner is still loading.';
+  if (!machineSummary.value) return 'The machine file has errors: mend it under Machine.';
+  return isSerial && !chosen.value ? 'Choose a port first.' : null;
+}
+
+export function ConnectDialog(): JSX.Element {
+  const isSerial = HAS_SERIAL && settings.value.connectTo === 'serial';
+  const why = obstacle(isSerial);
+  useEffect(() => {
+    notice.value = null;
+    if (HAS_SERIAL) void look();
+  }, []);
+  return (
+    <Dialog title="Connect" onClose={() => (openDialog.value = null)}>
+      <form
+        class="stack"
+        onSubmit={(event) => {
+          event.preventDefault();
+          if (why === null) go();
+        }}
+      >
+        {HAS_SERIAL ? (
+          <Choice
+            label="What to connect to"
+            choices={[
+              { value: 'serial', text: 'Printer on USB' },
+              { value: 'virtual', text: 'Virtual printer' },
+            ]}
+            value={isSerial ? 'serial' : 'virtual'}
+            onSet={(connectTo) => change({ connectTo })}
+          />
+        ) : (
+          <p class="hint">
+            This browser cannot reach USB printers. Chrome, Edge and Opera on a computer can (Web Serial).
+            Previews and the virtual printer work here too.
+          </p>
+        )}
+        <label class="field">
+          Machine
+          <select
+            value={activeProfile.value.id}
+            onChange={(event) => change({ profile: event.currentTarget.value })}
+          >
+            {profiles.value.map((profile) => (
+              <option key={profile.id} value={profile.id}>
+                {profile.name}
+              </option>
+            ))}
+          </select>
+        </label>
+        {isSerial ? <Ports /> : <Virtual />}
+        <div class="dialog-foot">
+          {why && <p class="hint">{why}</p>}
+          <button type="submit" class="button primary big" disabled={why !== null}>
+            Connect
+          </button>
+        </div>
+      </form>
+    </Dialog>
+  );
+}

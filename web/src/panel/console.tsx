@@ -1,0 +1,86 @@
+// The console: what happened, and a line to type G-code into, with a history.
+import type { JSX } from 'preact';
+import { useEffect, useRef, useState } from 'preact/hooks';
+import { entries } from '../state/log';
+import { gcode, mayMove } from '../state/machine';
+import { Button, Card } from './parts';
+
+const HISTORY_MAX = 50;
+const history: string[] = [];
+
+const time = new Intl.DateTimeFormat(undefined, { hour: '2-digit', minute: '2-digit', second: '2-digit' });
+
+function Log(): JSX.Element {
+  const ref = useRef<HTMLOListElement>(null);
+  const last = entries.value.at(-1)?.id;
+  // Follows what is new, unless the user has scrolled up to read.
+  useEffect(() => {
+    const list = ref.current;
+    if (last === undefined || !list) return;
+    if (list.scrollHeight - list.scrollTop - list.clientHeight < 80) list.scrollTop = list.scrollHeight;
+  }, [last]);
+  return (
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keyboard
+    <ol class="log" ref={ref} tabIndex={0} aria-label="Messages">
+      {entries.value.map((entry) => (
+        <li key={entry.id} class={entry.kind}>
+          <time dateTime={entry.at.toISOString()}>{time.format(entry.at)}</time>
+          <span>{entry.text}</span>
+        </li>
+      ))}
+    </ol>
+  );
+}
+
+export function Console(): JSX.Element {
+  const [text, setText] = useState('');
+  const [place, setPlace] = useState(0);
+  const submit = (): void => {
+    const line = text.trim();
+    if (line === '' || !mayMove.value) return;
+    if (history.at(-1) !== line) history.push(line);
+    if (history.length > HISTORY_MAX) history.shift();
+    setText('');
+    setPlace(0);
+    void gcode(line);
+  };
+  const recall = (steps: number): void => {
+    const next = Math.min(Math.max(place + steps, 0), history.length);
+    setPlace(next);
+    setText(next === 0 ? '' : (history.at(-next) ?? ''));
+  };
+  return (
+    <Card title="Console">
+      <Log />
+      <form
+        class="row"
+        onSubmit={(event) => {
+          event.preventDefault();
+          submit();
+        }}
+      >
+        <input
+          class="grow code"
+          type="text"
+          aria-label="G-code to send"
+          placeholder={mayMove.value ? 'G-code, e.g. G28 X' : 'G-code can be sent when the printer is ready'}
+          autocomplete="off"
+          autocapitalize="characters"
+          spellcheck={false}
+          maxLength={1000}
+          value={text}
+          disabled={!mayMove.value}
+          onInput={(event) => setText(event.currentTarget.value)}
+          onKeyDown={(event) => {
+            if (event.key !== 'ArrowUp' && event.key !== 'ArrowDown') return;
+            event.preventDefault();
+            recall(event.key === 'ArrowUp' ? 1 : -1);
+          }}
+        />
+        <Button disabled={!mayMove.value || text.trim() === ''} onClick={submit}>
+          Send
+        </Button>
+      </form>
+    </Card>
+  );
+}

@@ -1,0 +1,17 @@
+// What the profile in use describes, as the planner reads it: limits for fields, the bed for the 3D view.
+import { effect, signal } from '@preact/signals';
+import type { MachineSummary } from '../preview/protocol';
+import { checkConfig } from '../state/preview';
+import { activeProfile } from '../state/profiles';
+
+export const machineSummary = signal<MachineSummary | null>(null);
+
+/** Reads the profile again whenever it changes. */
+export function followProfile(): void {
+  effect(() => {
+    const { config } = activeProfile.value;
+    void checkConfig(config).then((report) => {
+      if (activeProfile.peek().config === config) machineSummary.value = report.machine;
+    });
+  });
+}

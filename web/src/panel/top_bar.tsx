@@ -1,0 +1,93 @@
+// The bar at the top: what is connected, the dialogs' buttons, and the emergency stop, apart from everything else.
+import { computed, signal } from '@preact/signals';
+import type { JSX } from 'preact';
+import {
+  connection,
+  disconnect,
+  emergencyStop,
+  isPrinting,
+  job,
+  plannerLoaded,
+  port,
+  snapshot,
+} from '../state/machine';
+import { activeProfile } from '../state/profiles';
+import { Icon } from './icons';
+import { Button } from './parts';
+
+export const openDialog = signal<'connect' | 'settings' | 'machine' | null>(null);
+
+interface Status {
+  readonly text: string;
+  readonly tone: 'off' | 'busy' | 'good' | 'bad';
+}
+
+const JOBS = {
+  none: 'Ready',
+  printing: 'Printing',
+  pausing: 'Pausing',
+  paused: 'Paused',
+  ending: 'Ending the print',
+} as const;
+
+const status = computed<Status>(() => {
+  if (connection.value === 'closed') return { text: 'Not connected', tone: 'off' };
+  const phase = snapshot.value?.phase;
+  if (connection.value === 'opening' || phase === undefined) return { text: 'Connecting', tone: 'busy' };
+  if (phase === 'ready') return { text: JOBS[job.value], tone: 'good' };
+  if (phase === 'shutdown') return { text: 'Stopped', tone: 'bad' };
+  return phase === 'failed' ? { text: 'Failed', tone: 'bad' } : { text: 'Connecting', tone: 'busy' };
+});
+
+function end(): void {
+  const question =
+    'A print is running. Disconnecting ends it: the board stops when its queue of moves is empty and switches the heaters off. Disconnect?';
+  if (!isPrinting.value || window.confirm(question)) disconnect();
+}
+
+export function TopBar(): JSX.Element {
+  const isClosed = connection.value === 'closed';
+  const where = port.value?.kind === 'virtual' ? 'Virtual printer' : activeProfile.value.name;
+  return (
+    <header class="top-bar">
+      <h1 class="brand">
+        <img src="./icon.svg" alt="" width="28" height="28" />
+        <span>Stepcast</span>
+      </h1>
+      <p class={`status ${status.value.tone}`} role="status">
+        <span class="dot" aria-hidden="true" />
+        <span>{status.value.text}</span>
+        {!isClosed && <span class="status-where">{where}</span>}
+      </p>
+      <nav class="top-actions" aria-label="Page">
+        {isClosed ? (
+          <Button icon="plug" kind="primary" onClick={() => (openDialog.value = 'connect')}>
+            Connect
+          </Button>
+        ) : (
+          <Button icon="plug" onClick={end}>
+            Disconnect
+          </Button>
+        )}
+        <Button icon="machine" kind="quiet" label="Machine" onClick={() => (openDialog.value = 'machine')} />
+        <Button
+          icon="settings"
+          kind="quiet"
+          label="Settings"
+          onClick={() => (openDialog.value = 'settings')}
+        />
+      </nav>
+      <button
+        type="button"
+        class="emergency"
+        onClick={emergencyStop}
+        disabled={isClosed || !plannerLoaded.value}
+      >
+        <Icon name="stop" />
+        <span>
+          Emergency<span class="emergency-more"> stop</span>
+        </span>
+      </button>
+    </header>
+  );
+}

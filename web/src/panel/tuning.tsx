@@ -1,0 +1,37 @@
+// What may be changed while printing: speed, flow, fan.
+import type { JSX } from 'preact';
+import { isReady, snapshot, wish } from '../state/machine';
+import { share } from '../units';
+import { Card, NumberField } from './parts';
+
+const percent = (value: number | undefined): number => Math.round((value ?? 0) * 100);
+
+export function Tuning(): JSX.Element {
+  const now = snapshot.value;
+  const field = (
+    label: string,
+    kind: 'speed-factor' | 'flow-factor' | 'fan',
+    value: number,
+    min: number,
+    max: number,
+  ): JSX.Element => (
+    <NumberField
+      label={label}
+      unit="%"
+      value={value}
+      min={min}
+      max={max}
+      disabled={!isReady.value}
+      onSet={(set) => void wish({ kind, value: share(set / 100) })}
+    />
+  );
+  return (
+    <Card title="Speed and fan">
+      <div class="fields">
+        {field('Speed', 'speed-factor', percent(now?.speedFactor ?? 1), 10, 300)}
+        {field('Flow', 'flow-factor', percent(now?.flowFactor ?? 1), 10, 200)}
+        {field('Part fan', 'fan', percent(now?.fan), 0, 100)}
+      </div>
+    </Card>
+  );
+}

@@ -1,0 +1,182 @@
+// The 3D view: the canvas, which layers are shown, travel moves; and the place where files are dropped.
+
+import { effect, signal } from '@preact/signals';
+import { attachControls, ToolpathHost } from '@stepcast/toolpath';
+import type { JSX } from 'preact';
+import { useEffect, useRef } from 'preact/hooks';
+import { isPrinting, snapshot } from '../state/machine';
+import { file, printedVertex, reading, setSink, summary } from '../state/preview';
+import { change, settings } from '../state/settings';
+import { Icon } from './icons';
+import { Legend } from './legend';
+import { machineSummary } from './machine_summary';
+import { formatNumber } from './numbers';
+import { openSample, pickFile } from './open_file';
+import { Button } from './parts';
+
+/** The top layer that is shown; null: all of them. */
+const topLayer = signal<number | null>(null);
+const viewFailure = signal<string | null>(null);
+const dark = window.matchMedia('(prefers-color-scheme: dark)');
+const systemIsDark = signal(dark.matches);
+dark.addEventListener('change', (event) => {
+  systemIsDark.value = event.matches;
+});
+
+function sizeOf(canvas: HTMLElement): { width: number; height: number; ratio: number } {
+  const { clientWidth, clientHeight } = canvas;
+  return {
+    width: Math.max(1, clientWidth),
+    height: Math.max(1, clientHeight),
+    ratio: Math.min(devicePixelRatio, 2),
+  };
+}
+
+/** Lets the view follow the page's state; returns what ends that. */
+function follow(host: ToolpathHost): () => void {
+  setSink({
+    begin: (header) => host.begin(header),
+    append: (vertices) => host.append(vertices),
+    finish: ({ layers }) => {
+      host.setLayers(layers.map(({ first, z }) => ({ firstVertex: first, zMm: z })));
+      host.end();
+    },
+    clear: () => {
+      topLayer.value = null;
+      host.clear();
+    },
+  });
+  const ends = [
+    effect(() => {
+      const { theme } = settings.value;
+      const isDark = theme === 'system' ? systemIsDark.value : theme === 'dark';
+      host.setTheme(isDark ? 'dark' : 'light');
+    }),
+    effect(() => {
+      const axes = machineSummary.value?.axes;
+      const [x, y, z] = axes ?? [];
+      if (!x || !y || !z) return;
+      host.setBed({ minMm: [x.min, y.min], maxMm: [x.max, y.max], heightMm: z.max });
+    }),
+    effect(() => {
+      host.show({
+        travel: settings.value.showTravel,
+        layerFrom: 0,
+        layerTo: topLayer.value ?? Number.MAX_SAFE_INTEGER,
+      });
+    }),
+    effect(() =>
+      host.setPrintedUpTo(isPrinting.value && snapshot.value ? printedVertex(snapshot.value) : null),
+    ),
+  ];
+  return () => {
+    for (const end of ends) end();
+  };
+}
+
+function Canvas(): JSX.Element {
+  const place = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    const parent = place.current;
+    if (!parent) return;
+    // A canvas is given away once, so each view has one of its own.
+    const canvas = document.createElement('canvas');
+    parent.append(canvas);
+    const host = new ToolpathHost(canvas, {
+      size: sizeOf(parent),
+      onEvent: (event) => {
+        if (event.type === 'failed') viewFailure.value = event.reason;
+      },
+    });
+    const release = attachControls(parent, host);
+    const observer = new ResizeObserver(() => host.resize(sizeOf(parent)));
+    observer.observe(parent);
+    const unfollow = follow(host);
+    return () => {
+      unfollow();
+      observer.disconnect();
+      release();
+      host.dispose();
+      canvas.remove();
+    };
+  }, []);
+  const label =
+    'Toolpath in 3D. Arrow keys turn it, with Shift they move it; plus and minus zoom, Home shows all.';
+  return (
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: the view is turned by keyboard
+    <div ref={place} class="canvas-place" role="application" aria-label={label} tabIndex={0} />
+  );
+}
+
+function LayerSlider(): JSX.Element | null {
+  const layers = summary.value?.layers ?? [];
+  if (layers.length < 2) return null;
+  const top = Math.min(topLayer.value ?? layers.length - 1, layers.length - 1);
+  const text = `Layer ${top + 1} of ${layers.length}, ${formatNumber(layers[top]?.z ?? 0, 2)} mm`;
+  return (
+    <label class="layer-slider">
+      <span class="layer-text">{text}</span>
+      <input
+        type="range"
+        min={0}
+        max={layers.length - 1}
+        step={1}
+        value={top}
+        aria-label="Top layer shown"
+        aria-valuetext={text}
+        onInput={(event) => {
+          const layer = event.currentTarget.valueAsNumber;
+          topLayer.value = layer >= layers.length - 1 ? null : layer;
+        }}
+      />
+    </label>
+  );
+}
+
+function Empty(): JSX.Element {
+  return (
+    <div class="empty">
+      <Icon name="file" />
+      <p class="empty-title">Drop a G-code file here</p>
+      <div class="row wrap centre">
+        <Button kind="primary" onClick={pickFile}>
+          Choose a file
+        </Button>
+        <Button onClick={() => void openSample()}>Open the sample</Button>
+      </div>
+      <p class="hint">It stays on this computer.</p>
+    </div>
+  );
+}
+
+export function Viewer(): JSX.Element {
+  const progress = reading.value;
+  return (
+    <section class="viewer" aria-label="Preview">
+      <Canvas />
+      {!file.value && <Empty />}
+      {viewFailure.value && (
+        <p class="view-failure">
+          The 3D view cannot be drawn: {viewFailure.value} Printing works without it.
+        </p>
+      )}
+      {progress !== null && (
+        <progress class="reading" aria-label="Reading the file" max={1} value={progress} />
+      )}
+      {summary.value && (
+        <div class="viewer-bar">
+          <LayerSlider />
+          <label class="check">
+            <input
+              type="checkbox"
+              checked={settings.value.showTravel}
+              onChange={(event) => change({ showTravel: event.currentTarget.checked })}
+            />
+            Travel moves
+          </label>
+        </div>
+      )}
+      <Legend />
+    </section>
+  );
+}

@@ -1,0 +1,121 @@
+// The planner's preview and configuration check for the preview worker: the generated WebAssembly behind the page's
+// types. The one place that knows the planner's messages about files.
+import type { ConfigReport as PlannerConfigReport } from '../bindings/ConfigReport';
+import type { PreviewSummary } from '../bindings/PreviewSummary';
+import initialise, { Preview, parse_config } from '../bindings/wasm/planner_wasm.js';
+import { plannerTrouble } from '../machine/planner';
+import type { Trouble } from '../machine/protocol';
+import { mm, seconds } from '../units';
+import type { ConfigReport, Summary, VertexHeader } from './protocol';
+
+/** A file being read. */
+export interface FilePreview {
+  feed(chunk: Uint8Array): void;
+  finish(): void;
+  header(): VertexHeader;
+  /** The vertices made since last time; the array is the caller's. */
+  takeVertices(): Uint32Array<ArrayBuffer>;
+  /** After `finish`. */
+  summary(): Summary;
+  free(): void;
+}
+
+export interface Reader {
+  preview(config: string | null): FilePreview;
+  checkConfig(text: string): ConfigReport;
+  asTrouble(error: unknown): Trouble | null;
+}
+
+export async function loadReader(): Promise<Reader> {
+  await initialise();
+  return { preview: (config) => new WasmPreview(config), checkConfig, asTrouble: plannerTrouble };
+}
+
+const AXES = ['X', 'Y', 'Z'] as const;
+
+function checkConfig(text: string): ConfigReport {
+  const report = JSON.parse(parse_config(text)) as PlannerConfigReport;
+  const { machine } = report;
+  return {
+    remarks: report.findings.map(({ line, severity, message }) => ({ line, severity, text: message })),
+    machine: machine && {
+      axes: AXES.map((name, axis) => ({
+        name,
+        min: mm(machine.min_mm[axis] ?? 0),
+        max: mm(machine.max_mm[axis] ?? 0),
+      })),
+      heaters: machine.heaters.map(({ name, max_c }) => ({ name, max: max_c })),
+      hasFan: machine.has_fan,
+      baud: machine.baud,
+    },
+  };
+}
+
+type Corner = readonly [number, number, number];
+const corner = ([x, y, z]: Corner) => [mm(x), mm(y), mm(z)] as const;
+
+function fromSummary(summary: PreviewSummary): Summary {
+  const bounds = summary.bounds_mm;
+  return {
+    errors: summary.errors.map((error) => ({
+      code: error.code,
+      line: error.line,
+      happened: error.what_happened,
+      safe: error.what_is_safe,
+      todo: error.what_to_do,
+    })),
+    blocking: summary.blocking.map(({ line, message }) => ({ line, severity: 'blocking', text: message })),
+    remarks: summary.findings.map(({ line, severity, message }) => ({ line, severity, text: message })),
+    dropped: Number(summary.dropped),
+    lines: summary.lines,
+    moves: Number(summary.moves),
+    filament: mm(summary.filament_mm),
+    bounds: bounds && { min: corner(bounds[0]), max: corner(bounds[1]) },
+    vertices: summary.vertices,
+    layers: summary.layers.map(({ first_vertex, z_mm, time_s }) => ({
+      first: first_vertex,
+      z: mm(z_mm),
+      time: seconds(time_s),
+    })),
+    time: summary.print_time_s === null ? null : seconds(summary.print_time_s),
+    features: summary.features.map(({ feature, time_s, filament_mm }) => ({
+      feature,
+      time: seconds(time_s),
+      filament: mm(filament_mm),
+    })),
+    generator: summary.generator,
+  };
+}
+
+class WasmPreview implements FilePreview {
+  readonly #inner: Preview;
+
+  constructor(config: string | null) {
+    this.#inner = new Preview(config ?? undefined);
+  }
+
+  feed(chunk: Uint8Array): void {
+    this.#inner.feed(chunk);
+  }
+
+  finish(): void {
+    this.#inner.finish();
+  }
+
+  header(): VertexHeader {
+    const [x = 0, y = 0, z = 0] = this.#inner.origin_mm;
+    return { originMm: [x, y, z], stepMm: this.#inner.step_mm };
+  }
+
+  takeVertices(): Uint32Array<ArrayBuffer> {
+    return this.#inner.take_vertices() as Uint32Array<ArrayBuffer>;
+  }
+
+  summary(): Summary {
+    return fromSummary(JSON.parse(this.#inner.summary()) as PreviewSummary);
+  }
+
+  free(): void {
+    this.#inner.free();
+  }
+}

@@ -1,0 +1,80 @@
+// What the page and the preview worker say to each other. Shapes only.
+import type { Trouble } from '../machine/protocol';
+import type { Mm, Seconds } from '../units';
+
+export type Severity = 'info' | 'warning' | 'blocking' | 'error';
+
+/** A remark on a line of a file; line 0 is the file as a whole. */
+export interface Remark {
+  readonly line: number;
+  readonly severity: Severity;
+  readonly text: string;
+}
+
+export interface Layer {
+  /** The layer's first vertex. */
+  readonly first: number;
+  readonly z: Mm;
+  readonly time: Seconds;
+}
+
+export interface FeatureShare {
+  /** The feature's number in the vertices. */
+  readonly feature: number;
+  readonly time: Seconds;
+  readonly filament: Mm;
+}
+
+/** What a file amounts to on the machine that was given. */
+export interface Summary {
+  readonly errors: readonly Trouble[];
+  /** Lines that somebody has to confirm before they are passed over. */
+  readonly blocking: readonly Remark[];
+  readonly remarks: readonly Remark[];
+  /** Findings beyond those kept. */
+  readonly dropped: number;
+  readonly lines: number;
+  readonly moves: number;
+  readonly filament: Mm;
+  readonly bounds: { readonly min: readonly [Mm, Mm, Mm]; readonly max: readonly [Mm, Mm, Mm] } | null;
+  readonly vertices: number;
+  readonly layers: readonly Layer[];
+  /** From the planner; null where the machine is not known. */
+  readonly time: Seconds | null;
+  readonly features: readonly FeatureShare[];
+  /** The program that wrote the file, where it says so. */
+  readonly generator: string | null;
+}
+
+/** What a printer.cfg describes. */
+export interface MachineSummary {
+  readonly axes: readonly { readonly name: string; readonly min: Mm; readonly max: Mm }[];
+  readonly heaters: readonly { readonly name: string; readonly max: number }[];
+  readonly hasFan: boolean;
+  /** For boards on a UART. */
+  readonly baud: number;
+}
+
+export interface ConfigReport {
+  readonly remarks: readonly Remark[];
+  /** Null where the text does not describe a machine that can be driven. */
+  readonly machine: MachineSummary | null;
+}
+
+export interface VertexHeader {
+  readonly originMm: readonly [number, number, number];
+  readonly stepMm: number;
+}
+
+export type ToPreview =
+  | { readonly kind: 'open'; readonly job: number; readonly file: Blob; readonly config: string | null }
+  | { readonly kind: 'check-config'; readonly id: number; readonly text: string };
+
+export type FromPreview =
+  | { readonly kind: 'loaded' }
+  | { readonly kind: 'failed'; readonly job: number | null; readonly trouble: Trouble }
+  | { readonly kind: 'begun'; readonly job: number; readonly header: VertexHeader }
+  | { readonly kind: 'vertices'; readonly job: number; readonly vertices: Uint32Array<ArrayBuffer> }
+  | { readonly kind: 'progress'; readonly job: number; readonly bytes: number }
+  | { readonly kind: 'summary'; readonly job: number; readonly summary: Summary }
+  | { readonly kind: 'config'; readonly id: number; readonly report: ConfigReport };

@@ -1,0 +1,85 @@
+// The preview worker: reads a file through the planner's preview and hands out geometry, findings and estimates. Also
+// checks printer.cfg texts. One file at a time: a new one ends the reading of the one before.
+import { FileChunks } from '../files';
+import { fileUnreadable, plannerMissing } from '../machine/troubles';
+import { loadReader, type Reader } from './planner';
+import type { FromPreview, ToPreview } from './protocol';
+
+/** Progress is told this often at most, in ms. */
+const PROGRESS_MS = 50;
+
+const scope = self as unknown as { postMessage(message: FromPreview, transfer?: Transferable[]): void };
+const tell = (message: FromPreview, transfer: Transferable[] = []): void =>
+  scope.postMessage(message, transfer);
+
+let loading: Promise<Reader> | undefined;
+let current = 0;
+
+function load(): Promise<Reader> {
+  loading ??= loadReader();
+  return loading;
+}
+
+async function read(reader: Reader, { job, file, config }: ToPreview & { kind: 'open' }): Promise<void> {
+  const chunks = await FileChunks.open(file);
+  const preview = reader.preview(config);
+  let begun = false;
+  const pass = (): void => {
+    const vertices = preview.takeVertices();
+    if (vertices.length === 0) return;
+    if (!begun) tell({ kind: 'begun', job, header: preview.header() });
+    begun = true;
+    tell({ kind: 'vertices', job, vertices }, [vertices.buffer]);
+  };
+  try {
+    let told = 0;
+    for (let chunk = await chunks.next(); chunk; chunk = await chunks.next()) {
+      if (current !== job) return;
+      preview.feed(chunk);
+      pass();
+      if (performance.now() - told > PROGRESS_MS) {
+        told = performance.now();
+        tell({ kind: 'progress', job, bytes: chunks.bytesRead });
+      }
+    }
+    preview.finish();
+    pass();
+    tell({ kind: 'summary', job, summary: preview.summary() });
+  } finally {
+    preview.free();
+    await chunks.cancel();
+  }
+}
+
+async function open(message: ToPreview & { kind: 'open' }): Promise<void> {
+  current = message.job;
+  let reader: Reader;
+  try {
+    reader = await load();
+  } catch (error) {
+    return tell({ kind: 'failed', job: message.job, trouble: plannerMissing(error) });
+  }
+  try {
+    await read(reader, message);
+  } catch (error) {
+    tell({ kind: 'failed', job: message.job, trouble: reader.asTrouble(error) ?? fileUnreadable(error) });
+  }
+}
+
+async function checkConfig({ id, text }: ToPreview & { kind: 'check-config' }): Promise<void> {
+  try {
+    tell({ kind: 'config', id, report: (await load()).checkConfig(text) });
+  } catch (error) {
+    tell({ kind: 'failed', job: null, trouble: plannerMissing(error) });
+  }
+}
+
+self.onmessage = ({ data }: MessageEvent<ToPreview>): void => {
+  if (data.kind === 'open') void open(data);
+  else void checkConfig(data);
+};
+
+load().then(
+  () => tell({ kind: 'loaded' }),
+  (error: unknown) => tell({ kind: 'failed', job: null, trouble: plannerMissing(error) }),
+);

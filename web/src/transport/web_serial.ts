@@ -1,0 +1,171 @@
+// A port of the Web Serial API as a Transport. Runs in the worker, where ports are found but never asked for.
+//
+// A framing or overrun error ends the browser's stream, not the connection: the next stream is taken up. An unplugged
+// device rejects with NetworkError and leaves `readable` null, on a terminal even without a `disconnect` event.
+import { PortError, type Transport } from './transport';
+
+/** The browser's default of 255 bytes loses data as soon as a task takes long. */
+const BUFFER_BYTES = 64 * 1024;
+/** So many errors with no byte between them are not a noisy line but a broken one. */
+const ERRORS_IN_A_ROW_MAX = 50;
+/** Errors after which the browser offers a new stream at once. */
+const RECOVERABLE = new Set([
+  'BreakError',
+  'FramingError',
+  'ParityError',
+  'BufferOverrunError',
+  'UnknownError',
+]);
+
+/** What tells a port from others in another realm: the devices' kind and which of that kind it is. */
+export interface PortId {
+  readonly vendor: number | null;
+  readonly product: number | null;
+  /** Among the ports of that kind, in the order of `getPorts()`. */
+  readonly index: number;
+}
+
+const sameKind = (port: SerialPort, vendor: number | null, product: number | null): boolean => {
+  const info = port.getInfo();
+  return (info.usbVendorId ?? null) === vendor && (info.usbProductId ?? null) === product;
+};
+
+/** How to find `port` again from a worker. */
+export function identify(port: SerialPort, all: readonly SerialPort[]): PortId {
+  const info = port.getInfo();
+  const vendor = info.usbVendorId ?? null;
+  const product = info.usbProductId ?? null;
+  const alike = all.filter((other) => sameKind(other, vendor, product));
+  return { vendor, product, index: Math.max(0, alike.indexOf(port)) };
+}
+
+/** The port of that identity among those that the user has allowed. */
+export function find(id: PortId, all: readonly SerialPort[]): SerialPort | undefined {
+  return all.filter((port) => sameKind(port, id.vendor, id.product))[id.index];
+}
+
+const nameOf = (error: unknown): string => (error instanceof DOMException ? error.name : '');
+
+/** Opens a port. Rejects with a PortError. */
+export async function openSerial(port: SerialPort, baudRate: number): Promise<Transport> {
+  try {
+    await port.open({ baudRate, bufferSize: BUFFER_BYTES });
+  } catch (error) {
+    const code = port.connected === false ? 'port-gone' : 'port-busy';
+    throw new PortError(code, error);
+  }
+  return new SerialTransport(port);
+}
+
+class SerialTransport implements Transport {
+  readonly readable: ReadableStream<Uint8Array<ArrayBuffer>>;
+  readonly writable: WritableStream<Uint8Array<ArrayBuffer>>;
+  readonly lost: Promise<PortError>;
+  readonly #port: SerialPort;
+  #lose: (error: PortError) => void = () => undefined;
+  #reader: ReadableStreamDefaultReader<Uint8Array> | undefined;
+  #writer: WritableStreamDefaultWriter<Uint8Array> | undefined;
+  #errors = 0;
+  #inARow = 0;
+  #closing = false;
+
+  constructor(port: SerialPort) {
+    this.#port = port;
+    this.lost = new Promise((resolve) => {
+      this.#lose = resolve;
+    });
+    port.addEventListener('disconnect', this.#unplugged);
+    this.readable = new ReadableStream({
+      pull: async (controller) => {
+        const bytes = await this.#read();
+        if (bytes) controller.enqueue(bytes);
+        else controller.close();
+      },
+    });
+    this.writable = new WritableStream({ write: (bytes) => this.#write(bytes) });
+  }
+
+  lineErrors(): number {
+    return this.#errors;
+  }
+
+  readonly #unplugged = (): void => this.#fail('unplugged');
+
+  #fail(code: 'unplugged' | 'port-error', cause?: unknown): void {
+    if (!this.#closing) this.#lose(new PortError(code, cause));
+  }
+
+  /** The next bytes, over as many streams as it takes; undefined when there will be none. */
+  async #read(): Promise<Uint8Array<ArrayBuffer> | undefined> {
+    while (!this.#closing) {
+      const stream = this.#port.readable;
+      if (!stream) {
+        this.#fail('unplugged');
+        return undefined;
+      }
+      this.#reader ??= stream.getReader();
+      try {
+        const { value, done } = await this.#reader.read();
+        if (value && value.byteLength > 0) {
+          this.#inARow = 0;
+          return value as Uint8Array<ArrayBuffer>;
+        }
+        if (done) this.#release();
+      } catch (error) {
+        this.#release();
+        if (!this.#recovers(error)) return undefined;
+      }
+    }
+    return undefined;
+  }
+
+  #recovers(error: unknown): boolean {
+    this.#errors += 1;
+    this.#inARow += 1;
+    if (!RECOVERABLE.has(nameOf(error))) this.#fail('unplugged', error);
+    else if (this.#inARow > ERRORS_IN_A_ROW_MAX) this.#fail('port-error', error);
+    else return true;
+    return false;
+  }
+
+  #release(): void {
+    this.#reader?.releaseLock();
+    this.#reader = undefined;
+  }
+
+  async #write(bytes: Uint8Array): Promise<void> {
+    const stream = this.#port.writable;
+    if (!stream) {
+      this.#fail('unplugged');
+      throw new PortError('unplugged');
+    }
+    try {
+      this.#writer ??= stream.getWriter();
+      await this.#writer.write(bytes);
+    } catch (error) {
+      this.#writer?.releaseLock();
+      this.#writer = undefined;
+      // A new stream replaces one that failed; what was in it is lost, which the link repairs.
+      if (nameOf(error) === 'UnknownError') this.#errors += 1;
+      else {
+        this.#fail('unplugged', error);
+        throw new PortError('unplugged', error);
+      }
+    }
+  }
+
+  async close(): Promise<void> {
+    if (this.#closing) return;
+    this.#closing = true;
+    this.#port.removeEventListener('disconnect', this.#unplugged);
+    // Streams that ended in an error cannot be ended again; the port must be closed all the same.
+    const settle = (promise: Promise<unknown> | undefined): Promise<unknown> =>
+      Promise.resolve(promise).catch(() => undefined);
+    await settle(this.#reader?.cancel());
+    this.#release();
+    await settle(this.#writer?.close());
+    this.#writer?.releaseLock();
+    this.#writer = undefined;
+    await settle(this.#port.close());
+  }
+}
