@@ -1,12 +1,12 @@
 // Measures what a first visit fetches, prints it, and fails the build when it is too much.
 //
 // Everything that is emitted counts, the workers and the planner's WebAssembly too, but for what is loaded only on
-// demand (the instruments). Sizes are those of brotli at its best, which static hosts serve.
+// demand: the instruments, the sample, and the 3D view for browsers that cannot draw in a worker. Sizes are those of brotli at its best, which static hosts serve.
 import { brotliCompressSync, constants } from 'node:zlib';
 import type { Plugin } from 'vite';
 
 /** Emitted files that a first visit does not fetch. */
-const ON_DEMAND = /instruments|\.map$/;
+const ON_DEMAND = /instruments|\/view-|\.gcode$|\.map$/;
 
 function compressed(content: string | Uint8Array): number {
   const bytes = typeof content === 'string' ? Buffer.from(content) : content;

@@ -16,7 +16,6 @@ function Errors({ errors }: { readonly errors: readonly Trouble[] }): JSX.Elemen
   return (
     <ul class="findings bad" aria-label="What stops the print">
       {errors.slice(0, SHOWN_MAX).map((error, index) => (
-        // biome-ignore lint/suspicious/noArrayIndexKey: the list never changes in place
         <li key={index}>
           <Icon name="warning" />
           <div>
@@ -55,7 +54,6 @@ function Remarks({ remarks }: { readonly remarks: readonly Remark[] }): JSX.Elem
       <summary>{remarks.length === 1 ? 'One remark' : `${formatNumber(remarks.length)} remarks`}</summary>
       <ul>
         {remarks.slice(0, SHOWN_MAX).map(({ line, text, severity }, index) => (
-          // biome-ignore lint/suspicious/noArrayIndexKey: the list never changes in place
           <li key={index} class={severity}>
             <strong>{lineText(line)}</strong> {text}
           </li>

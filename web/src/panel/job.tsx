@@ -47,8 +47,7 @@ function Facts(): JSX.Element | null {
   const facts = summary.value;
   if (!facts) return null;
   const { bounds } = facts;
-  const size =
-    bounds && bounds.max.map((max, axis) => formatNumber(max - (bounds.min[axis] ?? 0), 1)).join(' × ');
+  const size = bounds?.max.map((max, axis) => formatNumber(max - (bounds.min[axis] ?? 0), 1)).join(' × ');
   return (
     <dl class="facts">
       {facts.time !== null && (
@@ -158,7 +157,9 @@ export function Job(): JSX.Element {
     <section class="card job" aria-label="Print">
       {open ? (
         <div class="job-head">
-          <Icon name="file" />
+          <span class="job-icon">
+            <Icon name="file" />
+          </span>
           <div class="job-name">
             <h2>{open.name}</h2>
             <p class="dim">

@@ -47,7 +47,6 @@ function RemarkList({ remarks, area }: RemarkListProps): JSX.Element {
   return (
     <ul class="config-remarks">
       {remarks.map(({ line, severity, text }, index) => (
-        // biome-ignore lint/suspicious/noArrayIndexKey: the list is replaced as a whole
         <li key={index} class={severity}>
           {line > 0 ? (
             <button type="button" class="link" onClick={() => show(line)}>

@@ -62,7 +62,8 @@ function JogPad(): JSX.Element {
   );
   return (
     <div class="jog-pads">
-      <div class="jog-xy" role="group" aria-label="Move X and Y">
+      <fieldset class="jog-xy">
+        <legend class="unseen">Move X and Y</legend>
         {button('Y', 1, 'up', 'Back', 'north')}
         {button('X', -1, 'left', 'Left', 'west')}
         <Button
@@ -74,14 +75,15 @@ function JogPad(): JSX.Element {
         />
         {button('X', 1, 'right', 'Right', 'east')}
         {button('Y', -1, 'down', 'Front', 'south')}
-      </div>
-      <div class="jog-z" role="group" aria-label="Move Z">
+      </fieldset>
+      <fieldset class="jog-z">
+        <legend class="unseen">Move Z</legend>
         {button('Z', 1, 'up', 'Up', '')}
         <span class="jog-label" aria-hidden="true">
           Z
         </span>
         {button('Z', -1, 'down', 'Down', '')}
-      </div>
+      </fieldset>
     </div>
   );
 }

@@ -64,7 +64,6 @@ export function SettingsDialog(): JSX.Element {
         <h3>Temperature presets</h3>
         <ul class="presets">
           {presets.map((preset, index) => (
-            // biome-ignore lint/suspicious/noArrayIndexKey: names may be the same
             <PresetRow key={index} preset={preset} index={index} />
           ))}
         </ul>

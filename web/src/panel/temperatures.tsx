@@ -34,7 +34,7 @@ function Heater({ heater }: { readonly heater: HeaterState }): JSX.Element {
           {heater.target > 0 ? `Heating ${formatNumber(heater.duty * 100)} %` : 'Off'}
         </span>
       </div>
-      <div class={`reading ${heater.temperature >= HOT_C ? 'hot' : ''}`}>
+      <div class={`heater-reading ${heater.temperature >= HOT_C ? 'hot' : ''}`}>
         {formatNumber(heater.temperature, 1)}
         <span class="unit"> °C</span>
       </div>
@@ -65,7 +65,8 @@ export function Temperatures(): JSX.Element {
       ) : (
         <p class="hint">Shown once a printer is connected.</p>
       )}
-      <div class="row wrap" role="group" aria-label="Presets">
+      <fieldset class="row wrap">
+        <legend class="unseen">Presets</legend>
         {settings.value.presets.map((preset) => (
           <Button key={preset.name} disabled={!isReady.value} onClick={() => apply(preset)}>
             {preset.name}
@@ -74,7 +75,7 @@ export function Temperatures(): JSX.Element {
         <Button disabled={!isReady.value} onClick={() => apply({ name: '', nozzle: 0, bed: 0 })}>
           Cool down
         </Button>
-      </div>
+      </fieldset>
     </Card>
   );
 }

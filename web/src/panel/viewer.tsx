@@ -136,7 +136,9 @@ function LayerSlider(): JSX.Element | null {
 function Empty(): JSX.Element {
   return (
     <div class="empty">
-      <Icon name="file" />
+      <span class="empty-icon">
+        <Icon name="file" />
+      </span>
       <p class="empty-title">Drop a G-code file here</p>
       <div class="row wrap centre">
         <Button kind="primary" onClick={pickFile}>
