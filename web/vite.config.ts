@@ -1,7 +1,7 @@
 // How the page is built: no framework plugin (the JSX runtime is Preact's), workers as modules, the size checked.
 import { defineConfig } from 'vitest/config';
-import { firstLoadBudget } from './build/budget';
-import { contentSecurityPolicy } from './build/policy';
+import { firstLoadBudget } from './build/budget.ts';
+import { contentSecurityPolicy } from './build/policy.ts';
 
 /** First load without the instruments, compressed with brotli. */
 const FIRST_LOAD_MAX_BYTES = 700_000;

@@ -63,7 +63,7 @@ export function Console(): JSX.Element {
           class="grow code"
           type="text"
           aria-label="G-code to send"
-          placeholder={mayMove.value ? 'G-code, e.g. G28 X' : 'G-code can be sent when the printer is ready'}
+          placeholder={mayMove.value ? 'G-code, e.g. G28 X' : ''}
           autocomplete="off"
           autocapitalize="characters"
           spellcheck={false}

@@ -3,7 +3,7 @@ import type { JSX } from 'preact';
 import type { Trouble } from '../machine/protocol';
 import type { Remark } from '../preview/protocol';
 import { isPrinting } from '../state/machine';
-import { confirmed, confirmLine, failure, summary } from '../state/preview';
+import { confirmed, confirmLine, failure, file, summary } from '../state/preview';
 import { Icon } from './icons';
 import { formatNumber } from './numbers';
 
@@ -65,7 +65,7 @@ function Remarks({ remarks }: { readonly remarks: readonly Remark[] }): JSX.Elem
 }
 
 export function Findings(): JSX.Element | null {
-  if (failure.value) return <Errors errors={[failure.value]} />;
+  if (file.value && failure.value) return <Errors errors={[failure.value]} />;
   const found = summary.value;
   if (!found) return null;
   const remarks = found.remarks.filter(({ severity }) => severity === 'warning' || severity === 'info');

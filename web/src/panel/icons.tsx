@@ -17,7 +17,7 @@ const PATHS = {
   stop: 'M6 6h12v12H6z',
   check: 'M5 13l4 4L19 7',
   warning: 'M12 4l9 16H3zM12 10v4M12 17v.5',
-  machine: 'M4 20V4h16v16zM8 4v6h8V4M12 10v3M8 20v-3h8v3',
+  machine: 'M3 20h18M6 20V4h12v16M6 9h12M10 9v4h4V9M12 13v2.5',
   download: 'M12 4v11M7 11l5 5 5-5M5 20h14',
   view: 'M12 3l8 4.5v9L12 21l-8-4.5v-9zM12 12l8-4.5M12 12v9M12 12L4 7.5',
 } as const;

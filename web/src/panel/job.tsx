@@ -15,7 +15,7 @@ import {
 import { Findings } from './findings';
 import { Icon } from './icons';
 import { formatBytes, formatDuration, formatNumber } from './numbers';
-import { openSample, pickFile } from './open_file';
+import { pickFile } from './open_file';
 import { Button } from './parts';
 
 /** Why the file cannot be printed now; null where it can. */
@@ -150,8 +150,9 @@ function Outcome(): JSX.Element {
   );
 }
 
-export function Job(): JSX.Element {
+export function Job(): JSX.Element | null {
   const open = file.value;
+  if (!open && !isPrinting.value && !outcome.value) return null;
   const why = obstacle.value;
   return (
     <section class="card job" aria-label="Print">
@@ -174,19 +175,7 @@ export function Job(): JSX.Element {
             </span>
           )}
         </div>
-      ) : (
-        <p class="hint job-none">
-          No file is open.{' '}
-          <button type="button" class="link" onClick={pickFile}>
-            Choose a file
-          </button>
-          , drop one on the page, or{' '}
-          <button type="button" class="link" onClick={() => void openSample()}>
-            open the sample
-          </button>
-          .
-        </p>
-      )}
+      ) : null}
       <Facts />
       <Progress />
       {(open || isPrinting.value) && (

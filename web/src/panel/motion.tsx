@@ -26,7 +26,8 @@ function jog(axis: Axis, step: number): void {
 
 const extrude = (length: number): void => void wish({ kind: 'extrude', length: mm(length) });
 
-function Position(): JSX.Element {
+function Position(): JSX.Element | null {
+  if (!isReady.value) return null;
   const position = snapshot.value?.position;
   return (
     <dl class="position">
@@ -34,7 +35,14 @@ function Position(): JSX.Element {
         <div key={axis}>
           <dt>{axis}</dt>
           <dd>
-            {position && snapshot.value?.homed[index] ? formatNumber(position[index] ?? 0, 2) : 'not homed'}
+            {position && snapshot.value?.homed[index] ? (
+              formatNumber(position[index] ?? 0, 2)
+            ) : (
+              <>
+                <span aria-hidden="true">–</span>
+                <span class="unseen">not homed</span>
+              </>
+            )}
           </dd>
         </div>
       ))}
@@ -125,6 +133,17 @@ export function Motion(): JSX.Element {
         <Button disabled={!mayMove.value} onClick={() => extrude(-extrudeLength)}>
           Retract
         </Button>
+      </div>
+      <div class="row wrap">
+        {AXES.map((axis) => (
+          <Button
+            key={axis}
+            disabled={!mayMove.value}
+            onClick={() => void wish({ kind: 'home', axes: [axis] })}
+          >
+            Home {axis}
+          </Button>
+        ))}
         <Button disabled={!mayMove.value} onClick={() => void wish({ kind: 'motors-off' })}>
           Motors off
         </Button>

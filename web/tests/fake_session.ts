@@ -1,0 +1,102 @@
+// A session that does what a test tells it, for the loops around it.
+import type { Snapshot, Trouble, Wish } from '../src/machine/protocol';
+import type { Session, SimulatedPrinter } from '../src/machine/session';
+import { celsius, type Seconds, seconds, share } from '../src/units';
+
+const SNAPSHOT: Snapshot = {
+  phase: 'ready',
+  heaters: [{ name: 'extruder', temperature: celsius(20), target: celsius(0), duty: share(0) }],
+  position: null,
+  homed: [false, false, false],
+  job: 'none',
+  line: 0,
+  elapsed: seconds(0),
+  queued: null,
+  speedFactor: share(1),
+  flowFactor: share(1),
+  fan: share(0),
+  link: null,
+};
+
+export class FakeSession implements Session {
+  readonly received: number[] = [];
+  readonly polls: Seconds[] = [];
+  readonly wishes: Wish[] = [];
+  readonly #fed: Uint8Array[] = [];
+  wants = 0;
+  ended = false;
+  /** Seconds between wake-ups. */
+  period = 0.01;
+  toSend: number[] = [];
+  refusal: Trouble | null = null;
+
+  receive(bytes: Uint8Array): void {
+    this.received.push(...bytes);
+  }
+  poll(now: Seconds): Uint8Array<ArrayBuffer> {
+    this.polls.push(now);
+    return Uint8Array.from(this.toSend.splice(0));
+  }
+  wake(): Seconds {
+    return seconds((this.polls.at(-1) ?? 0) + this.period);
+  }
+  takeEvents(): [] {
+    return [];
+  }
+  wish(wish: Wish): Trouble | null {
+    this.wishes.push(wish);
+    return this.refusal;
+  }
+  startJob(): Trouble | null {
+    return this.refusal;
+  }
+  jobWants(): number {
+    return this.ended ? 0 : this.wants;
+  }
+  jobFeed(bytes: Uint8Array): void {
+    this.#fed.push(bytes.slice());
+    this.wants = Math.max(0, this.wants - bytes.byteLength);
+  }
+  get fed(): Buffer {
+    return Buffer.concat(this.#fed);
+  }
+  jobEnd(): void {
+    this.ended = true;
+  }
+  snapshot(): Snapshot {
+    return SNAPSHOT;
+  }
+  free(): void {
+    this.polls.length = 0;
+  }
+}
+
+/** A printer that echoes, `delay` s after it was written to. */
+export class EchoPrinter implements SimulatedPrinter {
+  readonly written: number[] = [];
+  #now = 0;
+  #due: { at: number; bytes: number[] }[] = [];
+  freed = false;
+  readonly delay = 0.002;
+
+  now(): Seconds {
+    return seconds(this.#now);
+  }
+  write(bytes: Uint8Array): void {
+    this.written.push(...bytes);
+    this.#due.push({ at: this.#now + this.delay, bytes: [...bytes] });
+  }
+  runUntil(until: Seconds): Uint8Array<ArrayBuffer> {
+    const next = this.#due[0];
+    if (next && next.at <= until) {
+      this.#due.shift();
+      this.#now = Math.max(this.#now, next.at);
+      return Uint8Array.from(next.bytes);
+    }
+    this.#now = Math.max(this.#now, until);
+    return new Uint8Array();
+  }
+  free(): void {
+    this.freed = true;
+  }
+}
