@@ -1,11 +1,11 @@
 // The planner's session and virtual printer for the machine worker: the generated WebAssembly behind the page's types.
 // The one place that knows the planner's messages about machines.
 import type { JobRequest } from '../bindings/JobRequest';
-import type { PrinterError } from '../bindings/PrinterError';
 import type { Snapshot as PlannerSnapshot } from '../bindings/Snapshot';
 import type { UiEvent } from '../bindings/UiEvent';
 import type { UiRequest } from '../bindings/UiRequest';
 import initialise, { PrinterSession, VirtualPrinter } from '../bindings/wasm/planner_wasm.js';
+import { inWords, plannerTrouble } from '../planner_error';
 import { celsius, mm, type Seconds, seconds, share } from '../units';
 import type { Axis, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
 import type { Session, SimulatedPrinter } from './session';
@@ -20,6 +20,8 @@ const lower = (axis: Axis): 'x' | 'y' | 'z' => axis.toLowerCase() as 'x' | 'y' |
 export interface Planner {
   /** Throws what `asTrouble` understands where the machine's file has errors. */
   openSession(config: string, now: Seconds): Session;
+  /** For the printer that `powerUp` makes from the same file and board. */
+  openVirtualSession(config: string, board: string, now: Seconds): Session;
   powerUp(config: string, board: string, seed: number, faults: string): SimulatedPrinter;
   /** The planner's error, or null where something else was thrown. */
   asTrouble(error: unknown): Trouble | null;
@@ -28,29 +30,12 @@ export interface Planner {
 export async function loadPlanner(): Promise<Planner> {
   await initialise();
   return {
-    openSession: (config, now) => new WasmSession(config, now),
+    openSession: (config, now) => new WasmSession(new PrinterSession(config, now)),
+    openVirtualSession: (config, board, now) =>
+      new WasmSession(PrinterSession.for_virtual_printer(config, board, now)),
     powerUp: (config, board, seed, faults) => new WasmPrinter(config, board, seed, faults),
     asTrouble: plannerTrouble,
   };
-}
-
-const inWords = (error: PrinterError): Trouble => ({
-  code: error.code,
-  line: error.line,
-  happened: error.what_happened,
-  safe: error.what_is_safe,
-  todo: error.what_to_do,
-});
-
-/** Errors are thrown with the catalogue's entry as JSON in their message. */
-export function plannerTrouble(error: unknown): Trouble | null {
-  const text = error instanceof Error ? error.message : typeof error === 'string' ? error : '';
-  try {
-    const entry = JSON.parse(text) as PrinterError;
-    return typeof entry.code === 'string' ? inWords(entry) : null;
-  } catch {
-    return null;
-  }
 }
 
 /** Runs what may be refused. */
@@ -165,8 +150,8 @@ function fromSnapshot(now: PlannerSnapshot): Snapshot {
 class WasmSession implements Session {
   readonly #inner: PrinterSession;
 
-  constructor(config: string, now: Seconds) {
-    this.#inner = new PrinterSession(config, now);
+  constructor(inner: PrinterSession) {
+    this.#inner = inner;
   }
 
   receive(bytes: Uint8Array, now: Seconds): void {

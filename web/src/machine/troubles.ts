@@ -69,6 +69,9 @@ export const fileUnreadable = (error: unknown): Trouble =>
     'Make the file readable again (disk, network drive, permission) and drop it anew; cancel the print that waits.',
   );
 
+export const notGcode = (todo: string): Trouble =>
+  trouble('file-binary', 'The file is not plain G-code.', NOTHING_MOVED, todo);
+
 export const plannerMissing = (error: unknown): Trouble =>
   trouble(
     'planner-missing',

@@ -135,7 +135,7 @@ async function connectVirtual(
     hold((over) => {
       const printer = loaded.powerUp(config, choice.board, choice.seed, choice.faults);
       const now = (): Seconds => printer.now();
-      const session = loaded.openSession(config, now());
+      const session = loaded.openVirtualSession(config, choice.board, now());
       const machine = new Machine(session, tell, () => 0);
       const loop = new LockstepLoop(machine, printer, choice.speed, realNow);
       loop.start((error) => over(workerDied(String(error))));

@@ -14,6 +14,7 @@ import {
 } from '../state/preview';
 import { Findings } from './findings';
 import { Icon } from './icons';
+import { machineSummary } from './machine_summary';
 import { formatBytes, formatDuration, formatNumber } from './numbers';
 import { pickFile } from './open_file';
 import { Button } from './parts';
@@ -24,6 +25,7 @@ const obstacle = computed<string | null>(() => {
   if (reading.value !== null) return 'The file is still being read.';
   if (failure.value || !summary.value) return 'The file could not be read.';
   if (summary.value.errors.length > 0) return 'The file cannot be printed on this machine: see below.';
+  if (!machineSummary.value) return 'The machine file has errors: mend it under Machine.';
   if (connection.value === 'closed') return 'Connect a printer to print.';
   if (!isReady.value) return 'The printer is not ready.';
   const open = unconfirmed.value.length;

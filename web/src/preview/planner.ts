@@ -1,20 +1,26 @@
 // The planner's preview and configuration check for the preview worker: the generated WebAssembly behind the page's
 // types. The one place that knows the planner's messages about files.
 import type { ConfigReport as PlannerConfigReport } from '../bindings/ConfigReport';
+import type { FileKindReport } from '../bindings/FileKindReport';
 import type { PreviewSummary } from '../bindings/PreviewSummary';
-import initialise, { Preview, parse_config } from '../bindings/wasm/planner_wasm.js';
-import { plannerTrouble } from '../machine/planner';
+import initialise, { file_kind, Preview, parse_config } from '../bindings/wasm/planner_wasm.js';
 import type { Trouble } from '../machine/protocol';
+import { notGcode } from '../machine/troubles';
+import { inWords, plannerTrouble } from '../planner_error';
 import { mm, seconds } from '../units';
 import type { ConfigReport, Summary, VertexHeader } from './protocol';
 
 /** A file being read. */
 export interface FilePreview {
+  /** How many bytes may be fed now; all are wanted again once there are no vertices to take. */
+  wants(): number;
   feed(chunk: Uint8Array): void;
   finish(): void;
   header(): VertexHeader;
-  /** The vertices made since last time; the array is the caller's. */
+  /** Works on what was fed; the vertices that came of it, none when all is done. The array is the caller's. */
   takeVertices(): Uint32Array<ArrayBuffer>;
+  /** Pairs of a line and the vertex where its segment ends, new since last time. */
+  takeMarks(): Uint32Array<ArrayBuffer>;
   /** After `finish`. */
   summary(): Summary;
   free(): void;
@@ -23,12 +29,22 @@ export interface FilePreview {
 export interface Reader {
   preview(config: string | null): FilePreview;
   checkConfig(text: string): ConfigReport;
+  /** What stands against reading a file as G-code, judged by its first bytes; null where nothing does. */
+  refuse(head: Uint8Array, name: string): Trouble | null;
   asTrouble(error: unknown): Trouble | null;
 }
 
 export async function loadReader(): Promise<Reader> {
   await initialise();
-  return { preview: (config) => new WasmPreview(config), checkConfig, asTrouble: plannerTrouble };
+  return { preview: (config) => new WasmPreview(config), checkConfig, refuse, asTrouble: plannerTrouble };
+}
+
+/** So much of a file says what it is. */
+const HEAD_BYTES = 4096;
+
+function refuse(head: Uint8Array, name: string): Trouble | null {
+  const { advice } = JSON.parse(file_kind(head.subarray(0, HEAD_BYTES), name)) as FileKindReport;
+  return advice === null ? null : notGcode(advice);
 }
 
 const AXES = ['X', 'Y', 'Z'] as const;
@@ -57,13 +73,7 @@ const corner = ([x, y, z]: Corner) => [mm(x), mm(y), mm(z)] as const;
 function fromSummary(summary: PreviewSummary): Summary {
   const bounds = summary.bounds_mm;
   return {
-    errors: summary.errors.map((error) => ({
-      code: error.code,
-      line: error.line,
-      happened: error.what_happened,
-      safe: error.what_is_safe,
-      todo: error.what_to_do,
-    })),
+    errors: summary.errors.map(inWords),
     blocking: summary.blocking.map(({ line, message }) => ({ line, severity: 'blocking', text: message })),
     remarks: summary.findings.map(({ line, severity, message }) => ({ line, severity, text: message })),
     dropped: Number(summary.dropped),
@@ -94,6 +104,10 @@ class WasmPreview implements FilePreview {
     this.#inner = new Preview(config ?? undefined);
   }
 
+  wants(): number {
+    return this.#inner.wants();
+  }
+
   feed(chunk: Uint8Array): void {
     this.#inner.feed(chunk);
   }
@@ -109,6 +123,10 @@ class WasmPreview implements FilePreview {
 
   takeVertices(): Uint32Array<ArrayBuffer> {
     return this.#inner.take_vertices() as Uint32Array<ArrayBuffer>;
+  }
+
+  takeMarks(): Uint32Array<ArrayBuffer> {
+    return this.#inner.take_marks() as Uint32Array<ArrayBuffer>;
   }
 
   summary(): Summary {

@@ -67,7 +67,13 @@ export interface VertexHeader {
 }
 
 export type ToPreview =
-  | { readonly kind: 'open'; readonly job: number; readonly file: Blob; readonly config: string | null }
+  | {
+      readonly kind: 'open';
+      readonly job: number;
+      readonly file: Blob;
+      readonly name: string;
+      readonly config: string | null;
+    }
   | { readonly kind: 'check-config'; readonly id: number; readonly text: string };
 
 export type FromPreview =
@@ -75,6 +81,8 @@ export type FromPreview =
   | { readonly kind: 'failed'; readonly job: number | null; readonly trouble: Trouble }
   | { readonly kind: 'begun'; readonly job: number; readonly header: VertexHeader }
   | { readonly kind: 'vertices'; readonly job: number; readonly vertices: Uint32Array<ArrayBuffer> }
+  /** Pairs of a line and the vertex where its segment ends, some dozens of vertices apart, in order. */
+  | { readonly kind: 'marks'; readonly job: number; readonly marks: Uint32Array<ArrayBuffer> }
   | { readonly kind: 'progress'; readonly job: number; readonly bytes: number }
   | { readonly kind: 'summary'; readonly job: number; readonly summary: Summary }
   | { readonly kind: 'config'; readonly id: number; readonly report: ConfigReport };

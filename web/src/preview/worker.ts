@@ -2,7 +2,7 @@
 // checks printer.cfg texts. One file at a time: a new one ends the reading of the one before.
 import { FileChunks } from '../files';
 import { fileUnreadable, plannerMissing } from '../machine/troubles';
-import { loadReader, type Reader } from './planner';
+import { type FilePreview, loadReader, type Reader } from './planner';
 import type { FromPreview, ToPreview } from './protocol';
 
 /** Progress is told this often at most, in ms. */
@@ -20,23 +20,52 @@ function load(): Promise<Reader> {
   return loading;
 }
 
-async function read(reader: Reader, { job, file, config }: ToPreview & { kind: 'open' }): Promise<void> {
+/** Without a machine where its file has errors: the picture is the same, and nothing can be printed with it anyway. */
+function openPreview(reader: Reader, config: string | null): FilePreview {
+  try {
+    return reader.preview(config);
+  } catch (error) {
+    if (config === null || reader.asTrouble(error) === null) throw error;
+    return reader.preview(null);
+  }
+}
+
+async function read(
+  reader: Reader,
+  { job, file, name, config }: ToPreview & { kind: 'open' },
+): Promise<void> {
   const chunks = await FileChunks.open(file);
-  const preview = reader.preview(config);
-  let begun = false;
+  const first = await chunks.next();
+  const refusal = reader.refuse(first ?? new Uint8Array(), name.replace(/\.gz$/i, ''));
+  if (refusal) {
+    await chunks.cancel();
+    return tell({ kind: 'failed', job, trouble: refusal });
+  }
+  const preview = openPreview(reader, config);
   const pass = (): void => {
-    const vertices = preview.takeVertices();
-    if (vertices.length === 0) return;
-    if (!begun) tell({ kind: 'begun', job, header: preview.header() });
-    begun = true;
-    tell({ kind: 'vertices', job, vertices }, [vertices.buffer]);
+    for (;;) {
+      const vertices = preview.takeVertices();
+      const marks = preview.takeMarks();
+      if (marks.length > 0) tell({ kind: 'marks', job, marks }, [marks.buffer]);
+      if (vertices.length === 0) return;
+      tell({ kind: 'vertices', job, vertices }, [vertices.buffer]);
+    }
+  };
+  const feed = (chunk: Uint8Array): void => {
+    for (let rest = chunk; rest.byteLength > 0; ) {
+      const piece = rest.subarray(0, preview.wants());
+      if (piece.byteLength === 0) throw new Error('the preview wants nothing more');
+      preview.feed(piece);
+      pass();
+      rest = rest.subarray(piece.byteLength);
+    }
   };
   try {
     let told = 0;
-    for (let chunk = await chunks.next(); chunk; chunk = await chunks.next()) {
+    tell({ kind: 'begun', job, header: preview.header() });
+    for (let chunk = first; chunk; chunk = await chunks.next()) {
       if (current !== job) return;
-      preview.feed(chunk);
-      pass();
+      feed(chunk);
       if (performance.now() - told > PROGRESS_MS) {
         told = performance.now();
         tell({ kind: 'progress', job, bytes: chunks.bytesRead });

@@ -35,6 +35,8 @@ let worker: Worker | undefined;
 let job = 0;
 let sink: GeometrySink | undefined;
 let configId = 0;
+let marks = new Uint32Array(4096);
+let marksUsed = 0;
 const configs = new Map<number, (report: ConfigReport) => void>();
 
 export function startPreview(): void {
@@ -67,8 +69,9 @@ function read(config: string): void {
   summary.value = null;
   failure.value = null;
   confirmed.value = new Set();
+  marksUsed = 0;
   sink?.clear();
-  send({ kind: 'open', job, file: open.blob, config });
+  send({ kind: 'open', job, file: open.blob, name: open.name, config });
 }
 
 /** Shows a file in place of the one before. */
@@ -122,6 +125,9 @@ function take(message: FromPreview): void {
     case 'vertices':
       sink?.append(message.vertices);
       break;
+    case 'marks':
+      keepMarks(message.marks);
+      break;
     case 'progress':
       reading.value = Math.min(1, message.bytes / Math.max(1, file.value?.blob.size ?? 1));
       break;
@@ -137,24 +143,26 @@ function take(message: FromPreview): void {
   }
 }
 
-/** Which layer is being printed after so much print time, and how much of it is done (0 … 1). */
-function layerAt(elapsed: number, layers: Summary['layers']): { layer: number; part: number } {
-  let rest = elapsed;
-  for (const [layer, { time }] of layers.entries()) {
-    if (rest < time) return { layer, part: rest / time };
-    rest -= time;
+/** Adds pairs to those that are there; the memory doubles, so that a long file costs no more copies than a short one. */
+function keepMarks(more: Uint32Array): void {
+  if (marksUsed + more.length > marks.length) {
+    const larger = new Uint32Array(Math.max(marks.length * 2, marksUsed + more.length));
+    larger.set(marks.subarray(0, marksUsed));
+    marks = larger;
   }
-  return { layer: layers.length, part: 0 };
+  marks.set(more, marksUsed);
+  marksUsed += more.length;
 }
 
-/** The last vertex that has been printed. Exact at layers' ends, in between by the share of the layer's time. */
-export function printedVertex({ elapsed }: Snapshot): number | null {
-  const found = summary.value;
-  if (!found || found.layers.length === 0) return null;
-  const { layer, part } = layerAt(elapsed, found.layers);
-  const from = found.layers[layer]?.first ?? found.vertices;
-  const to = found.layers[layer + 1]?.first ?? found.vertices;
-  return Math.max(0, Math.floor(from + (to - from) * part) - 1);
+/** The last vertex that has been printed when this line's moves have been made; a few dozen vertices short at most. */
+export function printedVertex({ line }: Snapshot): number {
+  let [low, high] = [0, marksUsed / 2];
+  while (low < high) {
+    const middle = (low + high) >>> 1;
+    if ((marks[middle * 2] ?? 0) <= line) low = middle + 1;
+    else high = middle;
+  }
+  return low === 0 ? 0 : (marks[low * 2 - 1] ?? 0);
 }
 
 /** How much of the print is done, by time where the plan is known, else by lines. */
