@@ -52,13 +52,19 @@ const steps = [
     needs: ['release build'],
     commands: [['cargo', 'xtask', 'wasm'], nodeTests('wasm.test.mjs')],
   },
+  { name: 'messages as TypeScript', commands: [['cargo', 'xtask', 'bindings', '--check']] },
   { name: 'biome', commands: [packaged('@biomejs/biome/bin/biome', 'check', '--error-on-warnings')] },
   {
-    name: 'page types',
+    name: 'TypeScript',
     needs: ['WebAssembly equals native'],
-    commands: ['tsconfig.json', 'tsconfig.node.json'].map((file) => packaged('typescript/bin/tsc', '--noEmit', '--project', join('web', file))),
+    commands: ['web/tsconfig.json', 'web/tsconfig.node.json', 'viz/toolpath/tsconfig.json'].map((file) =>
+      packaged('typescript/bin/tsc', '--noEmit', '--project', file),
+    ),
   },
-  { name: 'page tests', commands: [packaged('vitest/vitest.mjs', 'run', '--root', 'web')] },
+  {
+    name: 'TypeScript tests',
+    commands: ['web', 'viz/toolpath'].map((folder) => packaged('vitest/vitest.mjs', 'run', '--root', folder)),
+  },
   {
     name: 'page build',
     needs: ['WebAssembly equals native'],

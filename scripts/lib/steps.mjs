@@ -10,11 +10,12 @@ export const NOT_RUN = 'not run';
 const bold = (text) => (process.stdout.isTTY ? `\x1b[1m${text}\x1b[0m` : text);
 const seconds = (ms) => `${(ms / 1000).toFixed(1)} s`;
 
-// What Rust's and Node's test runners write when they are done.
+// What Rust's, Node's and vitest's test runners write when they are done.
 const RUST_RESULT = /^test result: \w+\. (\d+) passed; (\d+) failed; (\d+) ignored/gm;
 const NODE_RESULT = /^ℹ (pass|fail|skipped) (\d+)/gm;
+const VITEST_RESULT = /^\s+Tests\s.*\(\d+\)$/gm;
 
-/** How many tests the output of `cargo test` or `node --test` tells of. */
+/** How many tests the output of `cargo test`, `node --test` or `vitest run` tells of. */
 export function countTests(output) {
   const plain = output.replace(/\x1b\[[0-9;]*m/g, '');
   const counts = { passed: 0, failed: 0, skipped: 0 };
@@ -25,6 +26,9 @@ export function countTests(output) {
   }
   const key = { pass: 'passed', fail: 'failed', skipped: 'skipped' };
   for (const [, what, number] of plain.matchAll(NODE_RESULT)) counts[key[what]] += Number(number);
+  for (const [line] of plain.matchAll(VITEST_RESULT)) {
+    for (const [, number, what] of line.matchAll(/(\d+) (passed|failed|skipped)/g)) counts[what] += Number(number);
+  }
   return counts;
 }
 

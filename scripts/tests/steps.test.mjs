@@ -12,8 +12,10 @@ test('tests are counted from what the runners write, colours or not', () => {
     '\x1b[34mℹ pass 4\x1b[39m',
     '\x1b[34mℹ fail 0\x1b[39m',
     'ℹ skipped 1',
+    '\x1b[2m      Tests \x1b[22m \x1b[31m4 failed\x1b[39m | \x1b[32m56 passed\x1b[39m (60)',
+    '      Tests  7 passed (7)',
   ].join('\n');
-  assert.deepEqual(countTests(output), { passed: 19, failed: 2, skipped: 2 });
+  assert.deepEqual(countTests(output), { passed: 82, failed: 6, skipped: 2 });
 });
 
 /** Runs steps in a Node of their own and gives its exit status and its output. */
