@@ -3,7 +3,14 @@
  *
  * `vertices` is a file of raw vertices (docs/vertex.md) with its header as `URL.json`.
  */
-import { attachControls, type FrameReport, type Layer, ToolpathHost, type VertexHeader, type ViewEvent } from '../src/index';
+import {
+  attachControls,
+  type FrameReport,
+  type Layer,
+  ToolpathHost,
+  type VertexHeader,
+  type ViewEvent,
+} from '../src/index';
 import { HEADER, synthetic } from './synthetic';
 
 interface Harness {
@@ -35,7 +42,11 @@ window.harness = { host, frames: [], events: [], vertexCount: 0, layerCount: 0, 
 attachControls(canvas, host);
 addEventListener('resize', () => host.resize(sizeNow()));
 
-async function load(): Promise<{ header: VertexHeader; vertices: Uint32Array<ArrayBuffer>; layers: Layer[] }> {
+async function load(): Promise<{
+  header: VertexHeader;
+  vertices: Uint32Array<ArrayBuffer>;
+  layers: Layer[];
+}> {
   const url = query.get('vertices');
   if (!url) return { header: HEADER, ...synthetic(Number(query.get('segments') ?? 60_000)) };
   const [words, about] = await Promise.all([fetch(url), fetch(`${url}.json`)]);

@@ -17,7 +17,9 @@ const server = createServer(async (request, response) => {
   const path = normalize(new URL(request.url ?? '/', 'http://x').pathname);
   try {
     const body = await readFile(join(dist, path === '/' ? 'index.html' : path));
-    response.writeHead(200, { 'content-type': TYPES[extname(path)] ?? (path === '/' ? 'text/html' : 'application/octet-stream') });
+    response.writeHead(200, {
+      'content-type': TYPES[extname(path)] ?? (path === '/' ? 'text/html' : 'application/octet-stream'),
+    });
     response.end(body);
   } catch {
     response.writeHead(404).end();
@@ -25,14 +27,21 @@ const server = createServer(async (request, response) => {
 });
 
 const drawnAtRest = (page, since) =>
-  page.waitForFunction((n) => window.harness.ready && window.harness.frames.slice(n).some((f) => f.kind === 'full'), since, {
-    timeout: 120_000,
-  });
+  page.waitForFunction(
+    (n) => window.harness.ready && window.harness.frames.slice(n).some((f) => f.kind === 'full'),
+    since,
+    {
+      timeout: 120_000,
+    },
+  );
 const frameCount = (page) => page.evaluate(() => window.harness.frames.length);
 
 async function open(browser, url, query, size = { width: 1200, height: 800 }) {
   const page = await browser.newPage({ viewport: size });
-  page.on('console', (message) => message.type() !== 'log' && console.log(`  [${message.type()}] ${message.text()}`));
+  page.on(
+    'console',
+    (message) => message.type() !== 'log' && console.log(`  [${message.type()}] ${message.text()}`),
+  );
   page.on('pageerror', (error) => console.log(`  [page] ${error}`));
   await page.goto(`${url}?${query}`);
   await drawnAtRest(page, 0);
@@ -51,7 +60,9 @@ async function pictures(browser, url) {
   for (const theme of ['light', 'dark']) {
     const page = await open(browser, url, `theme=${theme}&segments=60000`);
     await act(page, `${theme}-whole`, () => window.harness.host.fit());
-    await act(page, `${theme}-cut`, () => window.harness.host.show({ layerTo: 20, travel: true, retractions: true, seams: true }));
+    await act(page, `${theme}-cut`, () =>
+      window.harness.host.show({ layerTo: 20, travel: true, retractions: true, seams: true }),
+    );
     await act(page, `${theme}-near`, () => {
       const { host } = window.harness;
       host.show({ layerTo: 30, travel: false, retractions: false, seams: false });
@@ -86,7 +97,10 @@ async function robustness(browser, url) {
   await drawnAtRest(page, since);
   await page.waitForTimeout(120);
   await page.screenshot({ path: join(out, 'restored.png') });
-  console.log('context lost and restored:', await page.evaluate(() => window.harness.events.filter((e) => e.startsWith('context')).join(', ')));
+  console.log(
+    'context lost and restored:',
+    await page.evaluate(() => window.harness.events.filter((e) => e.startsWith('context')).join(', ')),
+  );
   await page.close();
 }
 
@@ -123,7 +137,15 @@ await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
 const url = `http://127.0.0.1:${server.address().port}/`;
 const browser = await chromium.launch({
   executablePath: process.env.CHROME_PATH ?? '/usr/bin/chromium',
-  args: ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
+  args: [
+    '--no-sandbox',
+    '--disable-quic',
+    '--no-first-run',
+    '--disable-background-networking',
+    '--use-gl=angle',
+    '--use-angle=swiftshader',
+    '--enable-unsafe-swiftshader',
+  ],
 });
 try {
   if (!only || only === 'pictures') await pictures(browser, url);

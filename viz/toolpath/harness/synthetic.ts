@@ -73,7 +73,15 @@ const square = (x0: number, y0: number, x1: number, y1: number): [number, number
   [x0, y1],
 ];
 
-function zigzag(out: Writer, x0: number, y0: number, x1: number, y1: number, step: number, feature: FeatureName): void {
+function zigzag(
+  out: Writer,
+  x0: number,
+  y0: number,
+  x1: number,
+  y1: number,
+  step: number,
+  feature: FeatureName,
+): void {
   out.travel(x0, y0, feature);
   let up = true;
   for (let x = x0; x <= x1; x += step) {
@@ -100,7 +108,10 @@ export function synthetic(segments: number): Synthetic {
     if (layer < boxLayers) {
       for (let wall = 2; wall >= 0; wall--) {
         const inset = wall * 0.42;
-        out.loop(square(110 + inset, 50 + inset, 150 - inset, 100 - inset), wall === 0 ? 'outerWall' : 'innerWall');
+        out.loop(
+          square(110 + inset, 50 + inset, 150 - inset, 100 - inset),
+          wall === 0 ? 'outerWall' : 'innerWall',
+        );
       }
       const solid = layer < 3 || layer >= boxLayers - 3;
       const feature = layer === boxLayers - 1 ? 'topSurface' : solid ? 'solidInfill' : 'infill';

@@ -84,7 +84,11 @@ export class BedObjects {
   set(bed: Bed): void {
     this.clear();
     const plate = rectangle(bed.minMm, bed.maxMm, -PLATE_DROP_MM);
-    this.#add('bed', [0, 1, 2, 0, 2, 3].flatMap((corner) => [...(plate[corner] ?? [])]), true);
+    this.#add(
+      'bed',
+      [0, 1, 2, 0, 2, 3].flatMap((corner) => [...(plate[corner] ?? [])]),
+      true,
+    );
     const { fine, coarse } = gridLines(bed);
     this.#add('gridFine', fine);
     this.#add('gridCoarse', coarse);

@@ -100,7 +100,12 @@ export function pan(camera: CameraState, dx: CssPx, dy: CssPx, size: ViewSize): 
 /**
  * Scales the distance by `factor` (below 1: nearer). What is under `at` (pixels from the view's middle, y downwards) stays.
  */
-export function zoom(camera: CameraState, factor: number, size: ViewSize, at: readonly [CssPx, CssPx] = [0, 0]): CameraState {
+export function zoom(
+  camera: CameraState,
+  factor: number,
+  size: ViewSize,
+  at: readonly [CssPx, CssPx] = [0, 0],
+): CameraState {
   if (!(factor > 0) || !Number.isFinite(factor)) return camera;
   const distanceMm = clamp(camera.distanceMm * factor, DISTANCE_MIN_MM, DISTANCE_MAX_MM);
   const shift = (1 - distanceMm / camera.distanceMm) * mmPerPx(camera, size);

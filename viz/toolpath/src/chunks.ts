@@ -109,7 +109,8 @@ export class VertexStore {
       const part = words.subarray(taken * WORDS_PER_VERTEX, (taken + count) * WORDS_PER_VERTEX);
       write(chunk, chunk.count, part);
       const before = this.chunks.at(-2);
-      if (before && chunk.count === 0) write(before, before.count, part.subarray(0, TRAIL_TEXELS * WORDS_PER_VERTEX));
+      if (before && chunk.count === 0)
+        write(before, before.count, part.subarray(0, TRAIL_TEXELS * WORDS_PER_VERTEX));
       chunk.count += count;
       taken += count;
       this.#count += count;
@@ -145,7 +146,8 @@ export class VertexStore {
       const from = last.count * WORDS_PER_VERTEX;
       chunk.data.set(last.data.subarray(from, from + LEAD_TEXELS * WORDS_PER_VERTEX));
     } else {
-      for (let texel = 0; texel < LEAD_TEXELS; texel++) chunk.data[texel * WORDS_PER_VERTEX + 2] = FLAGS.break;
+      for (let texel = 0; texel < LEAD_TEXELS; texel++)
+        chunk.data[texel * WORDS_PER_VERTEX + 2] = FLAGS.break;
     }
     this.chunks.push(chunk);
     return chunk;

@@ -7,16 +7,24 @@ import type { Ms } from './units';
 
 /** What one go may take, with room for the rest of a frame of 50 ms. */
 export const FRAME_TARGET_MS: Ms = 36;
-/** Fewer say nothing about the cost of one: the fixed part of a frame outweighs them. */
-const SEGMENTS_MIN = 4_000;
+/** Goes with fewer segments tell what a go costs whatever is drawn in it. */
+const SEGMENTS_FEW = 1_000;
+/** However slow the machine: fewer would no longer look like the part. */
+const SEGMENTS_MIN = 8_000;
 const SEGMENTS_START = 40_000;
 /** More than any file: 2²⁶ vertices are 1 GiB. */
 const SEGMENTS_MAX = 1 << 26;
 /** The budget may grow so much from one go to the next: a single lucky measurement must not freeze the view. */
 const GROWTH_MAX = 4;
-const NEWEST_WEIGHT = 0.4;
+const NEWEST_WEIGHT = 0.3;
+/** Segments get at least this share of the target, even where the fixed cost eats it up. */
+const SHARE_MIN = 0.4;
+
+const towards = (old: number | null, newest: number): number =>
+  old === null ? newest : old + NEWEST_WEIGHT * (newest - old);
 
 export class DetailBudget {
+  #fixedMs: Ms = 0;
   #msPerSegment: number | null = null;
   #budget = SEGMENTS_START;
 
@@ -27,21 +35,21 @@ export class DetailBudget {
 
   /** What `segments` would take, or null before anything was measured. */
   estimateMs(segments: number): Ms | null {
-    return this.#msPerSegment === null ? null : this.#msPerSegment * segments;
+    return this.#msPerSegment === null ? null : this.#fixedMs + this.#msPerSegment * segments;
   }
 
   /** A go of so many segments took so long. */
   measured(segments: number, elapsedMs: Ms): void {
-    if (!(elapsedMs >= 0) || segments < SEGMENTS_MIN) return;
-    const cost = Math.max(elapsedMs, 0.5) / segments;
-    // Slower counts at once, faster little by little.
-    this.#msPerSegment =
-      this.#msPerSegment === null || cost > this.#msPerSegment
-        ? cost
-        : this.#msPerSegment + NEWEST_WEIGHT * (cost - this.#msPerSegment);
-    const wanted = FRAME_TARGET_MS / this.#msPerSegment;
-    this.#budget = Math.round(
-      Math.min(Math.max(wanted, SEGMENTS_MIN), this.#budget * GROWTH_MAX, SEGMENTS_MAX),
-    );
+    if (!(elapsedMs >= 0) || !(segments >= 0)) return;
+    if (segments < SEGMENTS_FEW) {
+      this.#fixedMs = towards(this.#fixedMs === 0 ? null : this.#fixedMs, elapsedMs);
+      return;
+    }
+    // A go cheaper than the fixed part was thought to be corrects that.
+    this.#fixedMs = Math.min(this.#fixedMs, 0.8 * elapsedMs);
+    this.#msPerSegment = towards(this.#msPerSegment, Math.max(elapsedMs - this.#fixedMs, 0.2) / segments);
+    const forSegments = Math.max(FRAME_TARGET_MS - this.#fixedMs, FRAME_TARGET_MS * SHARE_MIN);
+    const wanted = Math.min(forSegments / this.#msPerSegment, this.#budget * GROWTH_MAX, SEGMENTS_MAX);
+    this.#budget = Math.round(Math.max(wanted, SEGMENTS_MIN));
   }
 }

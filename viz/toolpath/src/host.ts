@@ -3,8 +3,9 @@
  *
  * Has the view's methods as messages. Does not know: the page, pointers (see controls.ts). Units: as in view.ts.
  */
-import type { CameraState } from './camera';
+
 import type { Bed } from './bed';
+import type { CameraState } from './camera';
 import type { Layer } from './layers';
 import { carryOut, type ViewEvent, type ViewRequest, type WorkerRequest } from './messages';
 import type { Theme } from './palette';

@@ -44,6 +44,11 @@ export class LayerList {
     this.#layers = ordered;
   }
 
+  /** The same layers in another numbering of the vertices. */
+  mapped(to: (vertex: VertexIndex) => VertexIndex): LayerList {
+    return new LayerList(this.#layers.map(({ firstVertex, zMm }) => ({ firstVertex: to(firstVertex), zMm })));
+  }
+
   get count(): number {
     return this.#layers.length;
   }
@@ -53,7 +58,10 @@ export class LayerList {
     if (this.count === 0) return { first: 0, end: vertexCount };
     const first = from <= 0 ? 0 : (this.#layers[from]?.firstVertex ?? vertexCount);
     const end = to < 0 ? 0 : (this.#layers[to + 1]?.firstVertex ?? vertexCount);
-    return { first: Math.min(first, vertexCount), end: Math.max(Math.min(end, vertexCount), Math.min(first, vertexCount)) };
+    return {
+      first: Math.min(first, vertexCount),
+      end: Math.max(Math.min(end, vertexCount), Math.min(first, vertexCount)),
+    };
   }
 
   /** The layer in which the vertex lies; 0 if there are none. */
@@ -73,6 +81,7 @@ export class LayerList {
     const wanted = Math.ceil(total / Math.max(budget, 1));
     if (wanted <= 1) return { ranges: [range], layerStep: 1, stride: 1 };
     const [bottom, top] = [this.layerOf(range.first), this.layerOf(Math.max(range.end - 1, 0))];
+
     const layerStep = Math.min(wanted, LAYER_STEP_MAX, Math.max(Math.floor((top - bottom + 1) / 2), 1));
     const ranges: VertexRange[] = [];
     for (let layer = top; layer >= bottom; layer -= layerStep) {

@@ -10,7 +10,6 @@ import {
   DataTexture,
   DoubleSide,
   GLSL3,
-  Group,
   type IUniform,
   LineSegments,
   Mesh,
@@ -19,6 +18,7 @@ import {
   Points,
   RawShaderMaterial,
   RGBAIntegerFormat,
+  Scene,
   UnsignedIntType,
 } from 'three';
 import { type Chunk, type ChunkRange, TEXELS_PER_ROW, VERTICES_PER_CHUNK } from './chunks';
@@ -43,10 +43,10 @@ const CAPS = [0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4, 5, 6, 9, 6, 7, 9, 7, 8, 9, 8, 
 
 /** Bodies alone, or with the caps. */
 export type BeadShape = 'body' | 'whole';
+const SHAPES: Readonly<Record<BeadShape, readonly number[]>> = { body: BODY, whole: [...BODY, ...CAPS] };
 
 export interface PathPart {
   readonly range: ChunkRange;
-  readonly shape: BeadShape;
   /** One of so many segments. */
   readonly stride: number;
 }
@@ -59,7 +59,7 @@ interface Drawn {
   texture: DataTexture;
   version: number;
   readonly sampler: IUniform<DataTexture>;
-  readonly beads: Record<BeadShape, Mesh<BufferGeometry, RawShaderMaterial[]>>;
+  readonly beads: Mesh<BufferGeometry, RawShaderMaterial[]>;
   readonly travels: LineSegments<BufferGeometry, RawShaderMaterial>;
   readonly markers: Points<BufferGeometry, RawShaderMaterial>;
 }
@@ -85,7 +85,9 @@ function textureOf(chunk: Chunk): DataTexture {
 }
 
 export class PathObjects {
-  readonly group = new Group();
+  readonly scene = new Scene();
+  readonly #pattern: readonly number[];
+  readonly #defines: Record<string, number>;
   readonly #drawn: Drawn[] = [];
   readonly #shared: Uniforms = {
     uOrigin: { value: [0, 0, 0] },
@@ -101,10 +103,19 @@ export class PathObjects {
     uMarkers: { value: 0 },
     uMarkerPx: { value: 6 },
     ...Object.fromEntries(
-      ['uRemaining', 'uTravel', 'uWipe', 'uRetract', 'uUnretract', 'uSeam'].map((name) => [name, { value: [0, 0, 0] }]),
+      ['uRemaining', 'uTravel', 'uWipe', 'uRetract', 'uUnretract', 'uSeam'].map((name) => [
+        name,
+        { value: [0, 0, 0] },
+      ]),
     ),
   };
-  #index: Record<BeadShape, BufferAttribute> | null = null;
+  #index: BufferAttribute | null = null;
+
+  constructor(shape: BeadShape) {
+    this.#pattern = SHAPES[shape];
+    this.#defines = shape === 'body' ? { LIT_AT_CORNERS: 1 } : {};
+    this.scene.matrixWorldAutoUpdate = false;
+  }
 
   set header(header: VertexHeader) {
     this.#set('uOrigin', [...header.originMm]);
@@ -158,21 +169,23 @@ export class PathObjects {
   /** Beads of these parts are drawn next, and nothing else. */
   showBeads(parts: readonly PathPart[]): void {
     this.#hideAll();
-    for (const { range, shape, stride } of parts) {
+    for (const { range, stride } of parts) {
       const drawn = this.#of(range.chunk);
       if (!drawn) continue;
-      const mesh = drawn.beads[shape];
-      const perBead = shape === 'whole' ? BODY.length + CAPS.length : BODY.length;
+      const perBead = this.#pattern.length;
       const first = Math.ceil(range.first / stride);
       const end = Math.ceil((range.first + range.count) / stride);
-      mesh.visible = true;
-      mesh.geometry.addGroup(first * perBead, (end - first) * perBead, 0);
+      drawn.beads.visible = true;
+      drawn.beads.geometry.addGroup(first * perBead, (end - first) * perBead, 0);
     }
     this.#set('uStride', parts[0]?.stride ?? 1);
   }
 
   /** Travels and markers of these ranges are drawn next, and nothing else. */
-  showLines(ranges: readonly ChunkRange[], what: { readonly travels: boolean; readonly markers: boolean }): void {
+  showLines(
+    ranges: readonly ChunkRange[],
+    what: { readonly travels: boolean; readonly markers: boolean },
+  ): void {
     this.#hideAll();
     for (const range of ranges) {
       const drawn = this.#of(range.chunk);
@@ -201,33 +214,35 @@ export class PathObjects {
 
   #hideAll(): void {
     for (const { beads, travels, markers } of this.#drawn) {
-      for (const object of [beads.body, beads.whole, travels, markers]) object.visible = false;
-      beads.body.geometry.clearGroups();
-      beads.whole.geometry.clearGroups();
+      for (const object of [beads, travels, markers]) object.visible = false;
+      beads.geometry.clearGroups();
     }
   }
 
   #create(chunk: Chunk): Drawn {
-    this.#index ??= { body: beadIndex(BODY), whole: beadIndex([...BODY, ...CAPS]) };
-    const index = this.#index;
+    this.#index ??= beadIndex(this.#pattern);
     const texture = textureOf(chunk);
     const sampler = { value: texture };
     const uniforms: Uniforms = { ...this.#shared, uVertices: sampler, uBase: { value: chunk.firstVertex } };
     const material = (vertexShader: string, fragmentShader: string): RawShaderMaterial => {
-      const made = new RawShaderMaterial({ glslVersion: GLSL3, vertexShader, fragmentShader, side: DoubleSide });
+      const made = new RawShaderMaterial({
+        glslVersion: GLSL3,
+        vertexShader,
+        fragmentShader,
+        side: DoubleSide,
+        defines: this.#defines,
+      });
       // Assigned, not given to the constructor, which would copy: the shared ones must stay shared.
       made.uniforms = uniforms;
       return made;
     };
-    const beads = [material(BEAD_VERTEX, BEAD_FRAGMENT)];
-    const mesh = (shape: BeadShape): Mesh<BufferGeometry, RawShaderMaterial[]> =>
-      this.#add(new Mesh(new BufferGeometry().setIndex(index[shape]), beads));
+    const geometry = new BufferGeometry().setIndex(this.#index);
     return {
       chunk,
       texture,
       sampler,
       version: chunk.version,
-      beads: { body: mesh('body'), whole: mesh('whole') },
+      beads: this.#add(new Mesh(geometry, [material(BEAD_VERTEX, BEAD_FRAGMENT)])),
       travels: this.#add(new LineSegments(new BufferGeometry(), material(TRAVEL_VERTEX, FLAT_FRAGMENT))),
       markers: this.#add(new Points(new BufferGeometry(), material(MARKER_VERTEX, FLAT_FRAGMENT))),
     };
@@ -237,18 +252,16 @@ export class PathObjects {
     object.frustumCulled = false;
     object.matrixAutoUpdate = false;
     object.visible = false;
-    this.group.add(object);
+    this.scene.add(object);
     return object;
   }
 
   #release({ texture, beads, travels, markers }: Drawn): void {
     texture.dispose();
-    this.group.remove(beads.body, beads.whole, travels, markers);
-    for (const object of [beads.body, beads.whole]) {
-      // The index is shared with the chunks to come.
-      object.geometry.setIndex(null).dispose();
-      for (const material of object.material) material.dispose();
-    }
+    this.scene.remove(beads, travels, markers);
+    // The index is shared with the chunks to come.
+    beads.geometry.setIndex(null).dispose();
+    for (const material of beads.material) material.dispose();
     for (const object of [travels, markers]) {
       object.geometry.dispose();
       object.material.dispose();

@@ -7,12 +7,16 @@
  * elsewhere the cap ends the bead. Units: mm; bits as in vertex.ts (docs/vertex.md).
  */
 import { LEAD_TEXELS, TEXELS_PER_ROW } from './chunks';
-import { FIELDS, FLAGS, FEATURE_COUNT_MAX, SIZE_STEP_MM } from './vertex';
+import { FEATURE_COUNT_MAX, FIELDS, FLAGS, featureNumber, SIZE_STEP_MM } from './vertex';
 
 /** Points of one bead: five at each end. */
 export const POINTS_PER_BEAD = 10;
 
 const mask = (bits: number): string => `${((1 << bits) - 1) >>> 0}u`;
+const WALLS = (['innerWall', 'outerWall', 'overhangWall', 'primeTower', 'support'] as const).reduce(
+  (bits, name) => bits | (1 << featureNumber(name)),
+  0,
+);
 const ROW_SHIFT = Math.log2(TEXELS_PER_ROW);
 
 /** What every shader that pulls vertices begins with. */
@@ -47,6 +51,22 @@ uint featureOf(uvec4 v) {
 const vec4 NOWHERE = vec4(0.0, 0.0, -2.0, 1.0);
 `;
 
+/** Two lamps that move with the eye. */
+const LIGHT = /* glsl */ `
+const vec3 KEY = vec3(-0.36, 0.62, 0.70);
+const vec3 FILL = vec3(0.78, 0.10, 0.62);
+const vec3 GLANCE = vec3(-0.195, 0.336, 0.921);
+
+vec3 lit(vec3 colour, vec3 towards) {
+  vec3 n = normalize(towards);
+  float key = max(dot(n, KEY), 0.0);
+  float fill = max(dot(n, FILL), 0.0);
+  float shine = pow(max(dot(n, GLANCE), 0.0), 24.0);
+  return colour * (0.34 + 0.62 * key + 0.18 * fill) + 0.04 * shine;
+}
+`;
+
+/** With `LIT_AT_CORNERS` defined the light is computed at the corners alone: cheaper, less round near by. */
 export const BEAD_VERTEX = /* glsl */ `${PULL}
 uniform vec3 cameraPosition;
 uniform uint uFeatures;
@@ -59,13 +79,17 @@ uniform vec2 uDefaultSize;
 uniform vec3 uPalette[${FEATURE_COUNT_MAX}];
 uniform vec3 uRemaining;
 
+#ifndef LIT_AT_CORNERS
 out vec3 vNormal;
+#endif
 out vec3 vColour;
-
+${LIGHT}
 const float SIZE_STEP = ${SIZE_STEP_MM};
 /** Cosine of the sharpest bend that is mitred. */
 const float MITRE_COS_MIN = -0.5;
 const float TIP = 0.8;
+/** Features whose beads lie on top of each other; the others' lie side by side. */
+const uint WALLS = ${WALLS}u;
 
 bool shown(uvec4 v) {
   return (v.z & NOT_LAID) == 0u && ((uFeatures >> featureOf(v)) & 1u) == 1u;
@@ -84,7 +108,9 @@ void main() {
   int texel = bead * uStride + ${LEAD_TEXELS};
 
   uvec4 own = vertexAt(texel);
+#ifndef LIT_AT_CORNERS
   vNormal = vec3(0.0, 0.0, 1.0);
+#endif
   vColour = vec3(0.0);
   gl_Position = NOWHERE;
   if (!shown(own)) return;
@@ -136,32 +162,38 @@ void main() {
     round_ = outward;
   }
 
-  // Beads thinner than a pixel would glitter: far away each has one normal.
+  // Beads about as thin as a pixel would glitter: far away each has the one normal of the surface it is part of.
   float pixel = uPixelAngle * length(sight);
-  vec3 facing = normalize(right * (q.x / half_.x) + up * (q.y / half_.y));
-  vNormal = mat3(viewMatrix) * mix(round_, facing, smoothstep(0.3, 1.0, pixel / size.x));
+  vec2 seen = vec2(dot(sight, right), dot(sight, up)) / length(sight);
+  bool wall = ((WALLS >> featureOf(own)) & 1u) == 1u;
+  vec2 lean = wall ? vec2(clamp(seen.x * 5.0, -1.0, 1.0), 0.4 * seen.y) : vec2(0.15 * seen.x, clamp(seen.y * 8.0, -1.0, 1.0));
+  vec3 surface = normalize(right * lean.x + up * lean.y + 1e-3 * sight / length(sight));
+  vec3 normal = mat3(viewMatrix) * mix(round_, surface, smoothstep(0.25, 0.8, pixel / min(size.x, height)));
   vec3 colour = uPalette[featureOf(own)];
   vColour = uBase + uint(bead * uStride) < uPrinted ? colour : mix(colour, uRemaining, 0.84);
+#ifdef LIT_AT_CORNERS
+  vColour = lit(vColour, normal);
+#else
+  vNormal = normal;
+#endif
   gl_Position = projectionMatrix * (viewMatrix * vec4(place, 1.0));
 }
 `;
 
 export const BEAD_FRAGMENT = /* glsl */ `
 precision highp float;
+#ifndef LIT_AT_CORNERS
 in vec3 vNormal;
+#endif
 in vec3 vColour;
 out vec4 colour;
-
-const vec3 KEY = vec3(-0.36, 0.62, 0.70);
-const vec3 FILL = vec3(0.78, 0.10, 0.62);
-const vec3 HALF = vec3(-0.195, 0.336, 0.921);
-
+${LIGHT}
 void main() {
-  vec3 n = normalize(vNormal);
-  float key = max(dot(n, KEY), 0.0);
-  float fill = max(dot(n, FILL), 0.0);
-  float shine = pow(max(dot(n, HALF), 0.0), 24.0);
-  colour = vec4(vColour * (0.34 + 0.62 * key + 0.18 * fill) + 0.07 * shine, 1.0);
+#ifdef LIT_AT_CORNERS
+  colour = vec4(vColour, 1.0);
+#else
+  colour = vec4(lit(vColour, vNormal), 1.0);
+#endif
 }
 `;
 

@@ -5,13 +5,13 @@
  * Units: CSS pixels times the pixel ratio; mm.
  */
 import {
+  BufferGeometry,
   Color,
   GLSL3,
   LinearFilter,
   LinearSRGBColorSpace,
   Matrix4,
   Mesh,
-  BufferGeometry,
   type Object3D,
   PerspectiveCamera,
   RawShaderMaterial,
@@ -44,7 +44,12 @@ export class Stage {
 
   constructor(canvas: HTMLCanvasElement | OffscreenCanvas) {
     // The full picture has its own samples; quick ones on the canvas go without.
-    this.renderer = new WebGLRenderer({ canvas, antialias: false, alpha: false, powerPreference: 'high-performance' });
+    this.renderer = new WebGLRenderer({
+      canvas,
+      antialias: false,
+      alpha: false,
+      powerPreference: 'high-performance',
+    });
     this.renderer.autoClear = false;
     this.renderer.sortObjects = false;
     // Colours are given and written as sRGB.
@@ -85,7 +90,10 @@ export class Stage {
     this.#ratio = Math.min(Math.max(ratio, 0.25), BUFFER_SIDE_MAX / side);
     this.renderer.setPixelRatio(this.#ratio);
     this.renderer.setSize(this.#size.width, this.#size.height, false);
-    this.#picture.setSize(Math.floor(this.#size.width * this.#ratio), Math.floor(this.#size.height * this.#ratio));
+    this.#picture.setSize(
+      Math.floor(this.#size.width * this.#ratio),
+      Math.floor(this.#size.height * this.#ratio),
+    );
   }
 
   set background(colour: HexColour) {
@@ -127,6 +135,14 @@ export class Stage {
   draw(surface: Surface, scene: Object3D): void {
     this.#aim(surface);
     this.renderer.render(scene, this.#camera);
+  }
+
+  /** With or without several samples a pixel in the full picture; what was in it is lost when that changes. */
+  set smooth(smooth: boolean) {
+    const samples = smooth ? SAMPLES : 0;
+    if (this.#picture.samples === samples) return;
+    this.#picture.samples = samples;
+    this.#picture.dispose();
   }
 
   /** Shows the full picture. */

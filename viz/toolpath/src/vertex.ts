@@ -152,7 +152,12 @@ const place = (name: FieldName, value: number): number => {
 };
 
 /** Writes one vertex at `index`; values out of range saturate. For tests and demonstrations: files are packed in Rust. */
-export function encodeVertex(header: VertexHeader, words: Uint32Array, index: number, input: VertexInput): void {
+export function encodeVertex(
+  header: VertexHeader,
+  words: Uint32Array,
+  index: number,
+  input: VertexInput,
+): void {
   const steps = (axis: 0 | 1 | 2): number => (input.positionMm[axis] - header.originMm[axis]) / header.stepMm;
   const size = (mm: number | undefined): number => (mm ?? 0) / SIZE_STEP_MM;
   const feature = featureNumber(input.feature ?? 'other');

@@ -6,13 +6,24 @@
  * vertex and layer indices.
  */
 import { Scene } from 'three';
-import { type Bed, bedBox, BedObjects, isBed } from './bed';
-import { type BoxMm, type CameraState, DEFAULT_CAMERA, FIELD_OF_VIEW, fit, orbit, pan, unionOf, zoom } from './camera';
+import { type Bed, BedObjects, bedBox, isBed } from './bed';
+import {
+  type BoxMm,
+  type CameraState,
+  DEFAULT_CAMERA,
+  FIELD_OF_VIEW,
+  fit,
+  orbit,
+  pan,
+  unionOf,
+  zoom,
+} from './camera';
 import { VertexStore } from './chunks';
+import { Rough } from './coarse';
 import { type Drawn, FrameLoop, type FrameReport, type Painter, realmClock } from './frames';
 import { type Layer, LayerList, type VertexRange } from './layers';
 import { featureMask, PALETTES, type Palette, type Theme } from './palette';
-import { ALL_PRINTED, type BeadShape, PathObjects } from './path';
+import { ALL_PRINTED, PathObjects } from './path';
 import { Stage, type Surface } from './stage';
 import type { CssPx, LayerIndex, Ms, VertexIndex } from './units';
 import { type FeatureName, FLAGS, type VertexHeader } from './vertex';
@@ -55,6 +66,8 @@ const SHOW_ALL: Shown = {
 };
 /** While vertices arrive, the picture follows this often. */
 const GROWTH_FRAME_MS: Ms = 200;
+/** Where a full picture takes longer, the next ones do without several samples a pixel. */
+const SMOOTH_MAX_MS: Ms = 1500;
 const EMPTY_BOX: BoxMm = { min: [-50, -50, 0], max: [50, 50, 50] };
 
 /** How far the full picture is. */
@@ -70,12 +83,14 @@ export class ToolpathView {
   readonly #canvas: HTMLCanvasElement | OffscreenCanvas;
   readonly #events: ViewEvents;
   readonly #stage: Stage;
-  readonly #path = new PathObjects();
+  readonly #fine = new PathObjects('whole');
+  /** For pictures in motion. */
+  readonly #coarse = new PathObjects('body');
   readonly #bedObjects = new BedObjects();
-  readonly #pathScene = new Scene();
   readonly #bedScene = new Scene();
   readonly #loop: FrameLoop;
   #store: VertexStore | null = null;
+  #rough: Rough | null = null;
   #layers = new LayerList();
   #bed: Bed | null = null;
   #camera: CameraState = DEFAULT_CAMERA;
@@ -84,17 +99,21 @@ export class ToolpathView {
   #printed = ALL_PRINTED;
   #progress: Progress = { phase: 'done', at: 0, printed: ALL_PRINTED };
   #grown: Ms = 0;
+  #smooth = true;
 
   constructor(canvas: HTMLCanvasElement | OffscreenCanvas, size: ViewSizePx, events: ViewEvents = {}) {
     this.#canvas = canvas;
     this.#events = events;
     this.#stage = new Stage(canvas);
-    this.#pathScene.add(this.#path.group);
     this.#bedScene.add(this.#bedObjects.group);
-    for (const scene of [this.#pathScene, this.#bedScene]) scene.matrixWorldAutoUpdate = false;
+    this.#bedScene.matrixWorldAutoUpdate = false;
     canvas.addEventListener('webglcontextlost', this.#onLost);
     canvas.addEventListener('webglcontextrestored', this.#onRestored);
-    this.#loop = new FrameLoop(this.#painter(), realmClock(), (report) => events.onFrame?.(report));
+    this.#loop = new FrameLoop(this.#painter(), realmClock(), (report) => {
+      // Once too slow, it stays so: the next picture of this size is no cheaper.
+      if (report.kind === 'full' && report.totalMs > SMOOTH_MAX_MS) this.#smooth = false;
+      events.onFrame?.(report);
+    });
     this.setTheme('light');
     this.resize(size);
   }
@@ -118,10 +137,10 @@ export class ToolpathView {
 
   /** A new file: what was there goes. */
   begin(header: VertexHeader): void {
-    this.#path.clear();
+    this.#empty();
     this.#store = new VertexStore(header);
-    this.#layers = new LayerList();
-    this.#path.header = header;
+    this.#rough = new Rough(header);
+    for (const path of [this.#fine, this.#coarse]) path.header = header;
     this.#printed = ALL_PRINTED;
     this.#shown = { ...this.#shown, layerFrom: 0, layerTo: SHOW_ALL.layerTo, vertexTo: null };
     this.#grown = performance.now();
@@ -132,6 +151,7 @@ export class ToolpathView {
   append(vertices: Uint32Array): void {
     if (!this.#store) return;
     this.#store.append(vertices);
+    this.#rough?.append(vertices);
     const now = performance.now();
     if (now - this.#grown < GROWTH_FRAME_MS) return;
     this.#grown = now;
@@ -140,14 +160,13 @@ export class ToolpathView {
 
   /** The file has no more vertices. */
   end(): void {
+    this.#rough?.end();
     this.#loop.moved();
   }
 
   /** No file any more. */
   clear(): void {
-    this.#path.clear();
-    this.#store = null;
-    this.#layers = new LayerList();
+    this.#empty();
     this.#loop.moved();
   }
 
@@ -171,7 +190,7 @@ export class ToolpathView {
 
   setTheme(theme: Theme): void {
     this.#palette = PALETTES[theme];
-    this.#path.palette = this.#palette;
+    for (const path of [this.#fine, this.#coarse]) path.palette = this.#palette;
     this.#bedObjects.palette = this.#palette;
     this.#stage.background = this.#palette.background;
     this.#loop.moved();
@@ -197,11 +216,10 @@ export class ToolpathView {
   }
 
   resize({ width, height, ratio }: ViewSizePx): void {
+    this.#smooth = true;
     this.#stage.resize(width, height, ratio);
-    this.#path.setPixels(
-      (2 * Math.tan(FIELD_OF_VIEW / 2)) / (this.#stage.size.height * this.#stage.ratio),
-      this.#stage.ratio,
-    );
+    const angle = (2 * Math.tan(FIELD_OF_VIEW / 2)) / (this.#stage.size.height * this.#stage.ratio);
+    for (const path of [this.#fine, this.#coarse]) path.setPixels(angle, this.#stage.ratio);
     this.#loop.moved();
   }
 
@@ -209,10 +227,9 @@ export class ToolpathView {
     this.#loop.pause();
     this.#canvas.removeEventListener('webglcontextlost', this.#onLost);
     this.#canvas.removeEventListener('webglcontextrestored', this.#onRestored);
-    this.#path.clear();
+    this.#empty();
     this.#bedObjects.clear();
     this.#stage.dispose();
-    this.#store = null;
   }
 
   readonly #onLost = (): void => {
@@ -241,33 +258,44 @@ export class ToolpathView {
     return { first: whole.first, end: Math.max(end, whole.first) };
   }
 
-  /** Sets camera and uniforms for the picture that is begun. */
-  #prepare(surface: Surface, heightScale: number): void {
-    const { retractions, seams, hiddenFeatures } = this.#shown;
+  #empty(): void {
+    this.#fine.clear();
+    this.#coarse.clear();
+    this.#store = null;
+    this.#rough = null;
+    this.#layers = new LayerList();
+  }
+
+  /** Sets the camera, clears and draws the bed. */
+  #prepare(surface: Surface): void {
     const box = unionOf(this.#bedBox(), this.#store?.boxOfAll() ?? null);
     this.#stage.look(this.#camera, box ?? EMPTY_BOX);
-    this.#path.sync(this.#store?.chunks ?? []);
-    this.#path.features = featureMask(hiddenFeatures);
-    this.#path.markers = (retractions ? FLAGS.retract | FLAGS.unretract : 0) | (seams ? FLAGS.seam : 0);
-    this.#path.printed = this.#printed;
-    this.#path.heightScale = heightScale;
     this.#stage.clear(surface);
     this.#stage.draw(surface, this.#bedScene);
   }
 
-  #beads(surface: Surface, ranges: readonly VertexRange[], shape: BeadShape, stride: number): void {
-    const parts = ranges.flatMap((range) => this.#store?.split(range) ?? []);
+  /** Brings the full path's textures and uniforms up to date. */
+  #prepareFine(): void {
+    const { retractions, seams, hiddenFeatures } = this.#shown;
+    this.#fine.sync(this.#store?.chunks ?? []);
+    this.#fine.features = featureMask(hiddenFeatures);
+    this.#fine.markers = (retractions ? FLAGS.retract | FLAGS.unretract : 0) | (seams ? FLAGS.seam : 0);
+    this.#fine.printed = this.#printed;
+  }
+
+  #beads(surface: Surface, range: VertexRange): void {
+    const parts = this.#store?.split(range) ?? [];
     if (parts.length === 0) return;
-    this.#path.showBeads(parts.map((range) => ({ range, shape, stride })));
-    this.#stage.draw(surface, this.#pathScene);
+    this.#fine.showBeads(parts.map((part) => ({ range: part, stride: 1 })));
+    this.#stage.draw(surface, this.#fine.scene);
   }
 
   #lines(surface: Surface, range: VertexRange): void {
     const { travel, retractions, seams } = this.#shown;
     const parts = this.#store?.split(range) ?? [];
     if (parts.length === 0) return;
-    this.#path.showLines(parts, { travels: travel, markers: retractions || seams });
-    this.#stage.draw(surface, this.#pathScene);
+    this.#fine.showLines(parts, { travels: travel, markers: retractions || seams });
+    this.#stage.draw(surface, this.#fine.scene);
   }
 
   #linesShown(): boolean {
@@ -289,34 +317,47 @@ export class ToolpathView {
   }
 
   #drawQuick(budget: number): number {
+    this.#prepare('canvas');
     const range = this.#range();
-    const { ranges, layerStep, stride } = this.#layers.reduced(range, budget);
-    this.#prepare('canvas', layerStep);
-    this.#beads('canvas', ranges, 'body', stride);
+    const rough = this.#rough;
+    if (!rough) return 0;
+    const { ranges, layerStep, stride } = rough.reduced(range, this.#layers, budget);
+    const parts = ranges.flatMap((part) => rough.store.split(part));
     const segments = ranges.reduce((sum, { first, end }) => sum + end - first, 0) / stride;
-    if (this.#linesShown() && range.end - range.first < budget) this.#lines('canvas', range);
+    this.#coarse.sync(rough.store.chunks);
+    this.#coarse.features = featureMask(this.#shown.hiddenFeatures);
+    this.#coarse.printed = this.#printed === ALL_PRINTED ? ALL_PRINTED : rough.coarseOf(this.#printed);
+    this.#coarse.heightScale = layerStep;
+    if (parts.length > 0) {
+      this.#coarse.showBeads(parts.map((part) => ({ range: part, stride })));
+      this.#stage.draw('canvas', this.#coarse.scene);
+    }
+    if (this.#linesShown() && range.end - range.first < budget) {
+      this.#prepareFine();
+      this.#lines('canvas', range);
+    }
     return segments;
   }
 
   #drawSlice(budget: number, restart: boolean): Drawn {
     const range = this.#range();
-    const progress = this.#progress;
     if (restart) {
-      this.#prepare('picture', 1);
+      this.#stage.smooth = this.#smooth;
+      this.#prepareFine();
+      this.#prepare('picture');
       this.#progress = { phase: 'beads', at: range.first, printed: this.#printed };
-      return this.#continue(this.#progress, range, budget);
     }
-    return this.#continue(progress, range, budget);
+    return this.#continue(this.#progress, range, budget);
   }
 
   #continue(progress: Progress, range: VertexRange, budget: number): Drawn {
     let left = Math.max(budget, 1);
     let segments = 0;
-    this.#path.printed = progress.printed;
+    this.#fine.printed = progress.printed;
     while (left > 0 && progress.phase !== 'done') {
       const part = { first: progress.at, end: Math.min(progress.at + left, range.end) };
       const count = Math.max(part.end - part.first, 0);
-      if (progress.phase === 'beads') this.#beads('picture', [part], 'whole', 1);
+      if (progress.phase === 'beads') this.#beads('picture', part);
       else this.#lines('picture', part);
       segments += count;
       left -= Math.max(count, 1);
@@ -338,8 +379,8 @@ export class ToolpathView {
     if (to === ALL_PRINTED || from === ALL_PRINTED || to < from) return false;
     const range = this.#range();
     const part = { first: Math.max(from, range.first), end: Math.min(to, range.end) };
-    this.#path.printed = to;
-    if (part.end > part.first) this.#beads('picture', [part], 'whole', 1);
+    this.#fine.printed = to;
+    if (part.end > part.first) this.#beads('picture', part);
     this.#progress.printed = to;
     this.#stage.present();
     return true;

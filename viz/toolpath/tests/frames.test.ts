@@ -1,0 +1,151 @@
+import { describe, expect, test } from 'vitest';
+import { DetailBudget, FRAME_TARGET_MS } from '../src/detail';
+import { type FrameClock, FrameLoop, type FrameReport, type Painter } from '../src/frames';
+
+/** A clock that is driven by the test. */
+class TestClock implements FrameClock {
+  time = 0;
+  #next = 1;
+  readonly #due = new Map<number, { at: number; callback: () => void }>();
+
+  now(): number {
+    return this.time;
+  }
+  requestFrame(callback: () => void): number {
+    return this.setTimer(callback, 16);
+  }
+  cancelFrame(handle: number): void {
+    this.#due.delete(handle);
+  }
+  setTimer(callback: () => void, delayMs: number): number {
+    this.#due.set(this.#next, { at: this.time + delayMs, callback });
+    return this.#next++;
+  }
+  clearTimer(handle: number): void {
+    this.#due.delete(handle);
+  }
+  run(until: number): void {
+    for (let step = 0; step < 100_000; step++) {
+      const [handle, next] = [...this.#due].sort(([, a], [, b]) => a.at - b.at)[0] ?? [];
+      if (handle === undefined || !next || next.at > until) break;
+      this.#due.delete(handle);
+      this.time = Math.max(this.time, next.at);
+      next.callback();
+    }
+    this.time = until;
+  }
+  get idle(): boolean {
+    return this.#due.size === 0;
+  }
+}
+
+/** A GPU that takes so long for each segment. */
+function setUp(total: number, msPerSegment: number) {
+  const clock = new TestClock();
+  const reports: FrameReport[] = [];
+  let [busyUntil, at, patches] = [0, 0, 0];
+  const spend = (segments: number): number => {
+    busyUntil = clock.time + 3 + segments * msPerSegment;
+    return segments;
+  };
+  const painter: Painter = {
+    fullSegments: () => total,
+    drawQuick: (budget) => spend(Math.min(budget, total)),
+    drawSlice: (budget, restart) => {
+      if (restart) at = 0;
+      const segments = spend(Math.min(budget, total - at));
+      at += segments;
+      return { segments, complete: at >= total };
+    },
+    patch: () => {
+      patches += 1;
+      return true;
+    },
+    fence: () => () => clock.time >= busyUntil,
+  };
+  const loop = new FrameLoop(painter, clock, (report) => reports.push(report));
+  return { clock, loop, reports, patches: () => patches };
+}
+
+describe('the loop of frames', () => {
+  test('a slow GPU: quick frames near the target while moving, then one full picture', () => {
+    const { clock, loop, reports } = setUp(1_000_000, 0.001);
+    for (let step = 0; step < 60; step++) {
+      loop.moved();
+      clock.run(clock.time + 16);
+    }
+    clock.run(clock.time + 5_000);
+    const quick = reports.filter(({ kind }) => kind === 'quick');
+    expect(quick.length).toBeGreaterThan(10);
+    for (const { longestMs } of quick.slice(2)) expect(longestMs).toBeLessThan(50);
+    const full = reports.filter(({ kind }) => kind === 'full');
+    expect(full).toHaveLength(1);
+    expect(full[0]?.segments).toBe(1_000_000);
+    expect(full[0]?.longestMs).toBeLessThan(60);
+    expect(clock.idle).toBe(true);
+  });
+
+  test('a fast GPU: full pictures at once', () => {
+    const { clock, loop, reports } = setUp(100_000, 0.00001);
+    loop.moved();
+    clock.run(1_000);
+    const before = reports.length;
+    for (let step = 0; step < 20; step++) {
+      loop.moved();
+      clock.run(clock.time + 40);
+    }
+    expect(reports.slice(before).every(({ kind }) => kind === 'full')).toBe(true);
+    expect(clock.idle).toBe(true);
+  });
+
+  test('movement abandons the full picture that is being drawn', () => {
+    const { clock, loop, reports } = setUp(1_000_000, 0.001);
+    loop.moved();
+    clock.run(500);
+    loop.moved();
+    clock.run(600);
+    expect(reports.some(({ kind }) => kind === 'full')).toBe(false);
+    expect(reports.at(-1)?.kind).toBe('quick');
+  });
+
+  test('what was printed is mended on the full picture, without a new one', () => {
+    const { clock, loop, reports, patches } = setUp(300_000, 0.001);
+    loop.moved();
+    clock.run(3_000);
+    loop.patched();
+    clock.run(4_000);
+    expect(patches()).toBe(1);
+    expect(reports.filter(({ kind }) => kind === 'full')).toHaveLength(1);
+  });
+
+  test('a lost context stops it, a restored one starts it again', () => {
+    const { clock, loop, reports } = setUp(1_000, 0.001);
+    loop.moved();
+    loop.pause();
+    loop.moved();
+    clock.run(1_000);
+    expect(reports).toHaveLength(0);
+    loop.resume();
+    clock.run(2_000);
+    expect(reports.at(-1)?.kind).toBe('full');
+  });
+});
+
+describe('the budget', () => {
+  test('finds what fits, with a fixed cost apart', () => {
+    const budget = new DetailBudget();
+    for (let frame = 0; frame < 40; frame++) {
+      budget.measured(0, 10);
+      budget.measured(budget.segments, 10 + budget.segments * 0.0005);
+    }
+    expect(10 + budget.segments * 0.0005).toBeGreaterThan(FRAME_TARGET_MS * 0.8);
+    expect(10 + budget.segments * 0.0005).toBeLessThan(FRAME_TARGET_MS * 1.2);
+  });
+
+  test('senseless measurements change nothing', () => {
+    const budget = new DetailBudget();
+    budget.measured(Number.NaN, 5);
+    budget.measured(5_000, Number.NaN);
+    expect(budget.segments).toBe(40_000);
+  });
+});
