@@ -1,74 +1,59 @@
-//! The planner for JavaScript: a thin shell over [`printer::planner`], with no logic of its own.
+//! Everything that the page runs in its workers, for JavaScript: planner, session, preview, virtual printer.
 //!
-//! Bytes cross as typed arrays. Errors cross as JavaScript errors with the catalogue's text.
+//! Thin shells over the crates, without logic of their own. Bytes, vertices and moves cross as typed arrays; everything
+//! else as JSON in the shapes of [`messages`]. What fails is thrown as an `Error` whose message is a `PrinterError` as
+//! JSON. Time is an argument, in seconds; nothing here reads a clock.
+
+mod host;
+pub mod messages;
+mod plan;
+mod preview;
+mod simulation;
+mod virtual_printer;
 
 use printer::{
-    config::{PrinterConfig, parse},
-    planner,
+    config::{ConfigDiagnostic, PrinterConfig, Severity, parse},
+    error::{ErrorCode, PrinterError},
 };
 use wasm_bindgen::prelude::{JsError, wasm_bindgen};
 
-/// Turns G-code into the blocks that would be sent to a board: feed it, then finish it.
-#[wasm_bindgen]
-pub struct PlanStream(planner::PlanStream);
+pub use host::{Host, MOVE_NUMBERS};
+pub use simulation::Simulation;
 
-/// What a finished plan amounts to.
+use messages::{ConfigReport, ErrorMessage, FileKindReport, json};
+
+/// The most findings that are put into one message; [`parse_config`] gives all of them.
+const FINDINGS_SHOWN_MAX: usize = 5;
+
+/// What is in a `printer.cfg`: a `ConfigReport` as JSON.
 #[wasm_bindgen]
-pub struct Plan {
-    report: planner::PlanReport,
-    blocks: Vec<u8>,
+pub fn parse_config(printer_cfg: &str) -> String {
+    json(&ConfigReport::of(printer_cfg))
 }
 
+/// What a file is, from its first bytes (4096 are enough) and its name: a `FileKindReport` as JSON.
 #[wasm_bindgen]
-impl PlanStream {
-    /// A plan for the machine that the text of a `printer.cfg` describes.
-    #[wasm_bindgen(constructor)]
-    pub fn new(printer_cfg: &str) -> Result<PlanStream, JsError> {
-        let (config, diagnostics) = parse(printer_cfg);
-        let config: PrinterConfig = config.ok_or_else(|| {
-            let lines: Vec<String> = diagnostics.iter().map(ToString::to_string).collect();
-            JsError::new(&lines.join("\n"))
-        })?;
-        Ok(Self(planner::PlanStream::new(&config)?))
-    }
-
-    /// How many bytes may be fed now.
-    pub fn wants(&self) -> usize {
-        self.0.wants()
-    }
-
-    /// Takes G-code; returns the blocks that follow from it.
-    pub fn feed(&mut self, gcode: &[u8]) -> Result<Vec<u8>, JsError> {
-        let mut blocks = Vec::new();
-        self.0.feed(gcode, &mut blocks, |_| {})?;
-        Ok(blocks)
-    }
-
-    /// Says that the file has ended.
-    pub fn finish(self) -> Result<Plan, JsError> {
-        let mut blocks = Vec::new();
-        let report = self.0.finish(&mut blocks, |_| {})?;
-        Ok(Plan { report, blocks })
-    }
+pub fn file_kind(head: &[u8], name: Option<String>) -> String {
+    json(&FileKindReport::from(gcode::sniff(head, name.as_deref())))
 }
 
+/// The text of the machine that is simulated where the user has none.
 #[wasm_bindgen]
-impl Plan {
-    /// The last blocks.
-    #[wasm_bindgen(getter)]
-    pub fn blocks(&self) -> Vec<u8> {
-        self.blocks.clone()
-    }
+pub fn usual_printer_cfg() -> String {
+    demo_machine::USUAL_MACHINE.to_owned()
+}
 
-    /// From the first move to the last, in s.
-    #[wasm_bindgen(getter)]
-    pub fn print_time_s(&self) -> f64 {
-        self.report.print_time.get()
-    }
+/// An error as JavaScript is told.
+fn thrown(error: &PrinterError) -> JsError {
+    JsError::new(&json(&ErrorMessage::from(error)))
+}
 
-    /// Steps of each motor (X, Y, Z, E), in both directions together.
-    #[wasm_bindgen(getter)]
-    pub fn steps(&self) -> Vec<u64> {
-        self.report.motors.iter().map(|motor| motor.steps).collect()
-    }
+/// A machine, or what is wrong with its file.
+fn read_config(printer_cfg: &str) -> Result<PrinterConfig, PrinterError> {
+    let (config, diagnostics) = parse(printer_cfg);
+    config.ok_or_else(|| {
+        let errors = diagnostics.iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
+        let lines: Vec<String> = errors.take(FINDINGS_SHOWN_MAX).map(ConfigDiagnostic::to_string).collect();
+        PrinterError::new(ErrorCode::ConfigInvalid, lines.join("; ").trim_end_matches('.'))
+    })
 }

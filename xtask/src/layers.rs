@@ -68,7 +68,14 @@ const LAYERS: &[Layer] = &[
     Layer {
         name: "planner-wasm",
         folder: "planner-wasm",
-        may_use: &["units", "gcode", "motion", "steps", "printer"],
+        may_use: &["units", "gcode", "printer", "firmware-core", "virtual-printer", "demo-machine"],
+        tests_may_use: &[],
+        pure: true,
+    },
+    Layer {
+        name: "demo-machine",
+        folder: "crates/demo_machine",
+        may_use: &["units", "printer", "firmware-core", "virtual-printer"],
         tests_may_use: &[],
         pure: true,
     },
@@ -84,6 +91,7 @@ const LAYERS: &[Layer] = &[
             "printer",
             "firmware-core",
             "virtual-printer",
+            "demo-machine",
         ],
         tests_may_use: &[],
         pure: false,

@@ -1,8 +1,9 @@
-//! Chores of this repository that need more than cargo: `cargo xtask layers | wasm | bench motion`.
+//! Chores of this repository that need more than cargo: `cargo xtask layers | bindings | wasm | bench motion`.
 //!
 //! Knows the folders and the tools, nothing of printers. What a machine lacks is named, never installed.
 
 mod bench;
+mod bindings;
 mod callgrind;
 mod layers;
 mod sources;
@@ -25,6 +26,12 @@ struct Arguments {
 enum Chore {
     /// Check that crates use only what ARCHITECTURE.md lets them use, and that the paths named there exist
     Layers,
+    /// Write the TypeScript types of the messages between page and WebAssembly
+    Bindings {
+        /// Write nothing; fail where the committed types differ
+        #[arg(long)]
+        check: bool,
+    },
     /// Build the planner for WebAssembly, with bindings for Node and the web
     Wasm,
     /// Measure a part of the program
@@ -49,6 +56,7 @@ enum Subject {
 fn main() -> ExitCode {
     let result = match Arguments::parse().chore {
         Chore::Layers => layers::run(),
+        Chore::Bindings { check } => bindings::run(check),
         Chore::Wasm => wasm::run(),
         Chore::Bench { subject: Subject::Motion { file, config } } => bench::motion(file, config),
     };

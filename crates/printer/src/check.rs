@@ -87,14 +87,24 @@ impl Checker {
 
     /// Takes the next bytes of the file.
     pub fn feed(&mut self, bytes: &[u8]) {
+        self.feed_with(bytes, |_, _| {});
+    }
+
+    /// The same, and shows each action with its line to `each`, so that others need not read the file again.
+    pub fn feed_with(&mut self, bytes: &[u8], each: impl FnMut(Action, LineNumber)) {
         self.lines.feed(bytes);
-        self.read();
+        self.read(each);
+    }
+
+    /// Says that the file has ended, and shows the last line's actions to `each`.
+    pub fn end_with(&mut self, each: impl FnMut(Action, LineNumber)) {
+        self.lines.end();
+        self.read(each);
     }
 
     /// The file has ended: what came of it.
     pub fn finish(mut self) -> CheckReport {
-        self.lines.end();
-        self.read();
+        self.end_with(|_, _| {});
         let line = self.report.lines;
         if self.report.moves == 0 {
             self.error(ErrorCode::FileEmpty, "the file makes no move".into(), None);
@@ -105,14 +115,17 @@ impl Checker {
         self.report
     }
 
-    fn read(&mut self) {
+    fn read(&mut self, mut each: impl FnMut(Action, LineNumber)) {
         while let Some(line) = self.lines.next() {
             let number = line.number;
             self.report.lines = number.0;
             self.interpreter.line(number, line.bytes, &mut self.actions, &mut self.found);
-            for action in core::mem::take(&mut self.actions) {
+            let mut actions = core::mem::take(&mut self.actions);
+            for action in actions.drain(..) {
                 self.act(&action, number);
+                each(action, number);
             }
+            self.actions = actions;
             for diagnostic in core::mem::take(&mut self.found) {
                 self.remark(diagnostic);
             }

@@ -13,5 +13,6 @@ pub mod link;
 pub mod machine;
 pub mod move_queue;
 pub mod planner;
+pub mod preview;
 pub mod session;
 pub mod thermistor;

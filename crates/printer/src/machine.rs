@@ -2,6 +2,7 @@
 //!
 //! Knows the order of motors, which is the same everywhere: X, Y, Z, extruder.
 
+use gcode::VelocityLimit;
 use motion::{ExtruderLimits, Limits};
 use steps::{Cartesian, StepGenerator, StepperSpec};
 use units::{Hertz, Mm, MmPerS, MmPerS2, Seconds};
@@ -57,6 +58,24 @@ pub fn limits(config: &PrinterConfig) -> Limits {
         max_z_accel: printer.max_z_accel,
         extruder,
     }
+}
+
+/// The limits after a file's own: it may ask for less than the machine file allows, never for more.
+pub fn lowered(machine: &Limits, current: &Limits, limit: &VelocityLimit) -> Limits {
+    let mut limits = *current;
+    if let Some(velocity) = limit.velocity {
+        limits.max_velocity = velocity.min(machine.max_velocity);
+    }
+    if let Some(accel) = limit.accel {
+        limits.max_accel = accel.min(machine.max_accel);
+    }
+    if let Some(corner) = limit.square_corner_velocity {
+        limits.square_corner_velocity = corner.min(machine.square_corner_velocity);
+    }
+    if let Some(ratio) = limit.minimum_cruise_ratio {
+        limits.minimum_cruise_ratio = ratio;
+    }
+    limits
 }
 
 /// A step generator for the machine's motors.

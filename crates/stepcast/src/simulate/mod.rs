@@ -7,12 +7,10 @@ mod digest;
 mod gcode_path;
 mod observer;
 mod path_check;
-pub(crate) mod pins;
 mod report;
 mod run;
 mod tally;
 mod temperature;
-pub(crate) mod wiring;
 
 use std::{collections::BTreeSet, process::ExitCode};
 

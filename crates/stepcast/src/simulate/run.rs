@@ -16,10 +16,9 @@ use virtual_printer::{State, VirtualPrinter};
 
 use super::{
     observer::{Observer, Wish},
-    own_error, pins,
+    own_error,
     report::{After, Motor, Outcome, Report},
     tally::Tally,
-    wiring,
 };
 use crate::{
     cli::{Board, SimulateArgs},
@@ -101,8 +100,8 @@ impl Simulation {
         mut config: PrinterConfig,
         options: JobOptions,
     ) -> anyhow::Result<Self> {
-        let board = pins::fit(&mut config, args.machine.board.map(Board::profile).as_ref())?;
-        let machine = wiring::machine(&config)?;
+        let board = demo_machine::fit(&mut config, args.machine.board.map(Board::profile).as_ref())?;
+        let machine = demo_machine::machine(&config)?;
         let step_distances = printer::machine::step_distances(&config).map(|distance| distance.0);
         let tally = Tally::new(step_distances, board.clock);
         let host_hz = board.clock;

@@ -9,9 +9,6 @@ use std::process::ExitCode;
 
 use crate::cli::VirtualPrinterArgs;
 
-/// The machine where none is given.
-pub(crate) const USUAL_MACHINE: &str = include_str!("../../../../samples/printer.cfg");
-
 /// Runs the command.
 #[cfg(unix)]
 pub(crate) fn run(args: &VirtualPrinterArgs) -> anyhow::Result<ExitCode> {

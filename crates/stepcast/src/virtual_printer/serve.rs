@@ -14,11 +14,10 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use units::{Seconds, Ticks};
 use virtual_printer::VirtualPrinter;
 
-use super::{USUAL_MACHINE, pty::Pty};
+use super::pty::Pty;
 use crate::{
     cli::{Board, VirtualPrinterArgs},
     config_file, console,
-    simulate::{pins, wiring},
 };
 
 /// The board answers within this time of its own at the latest.
@@ -34,12 +33,12 @@ const CATCH_UP_MAX: Seconds = Seconds(1.0);
 pub(super) fn run(args: &VirtualPrinterArgs) -> anyhow::Result<ExitCode> {
     let mut machine_file = match &args.config {
         Some(path) => config_file::load(path)?,
-        None => config::parse(USUAL_MACHINE)
+        None => config::parse(demo_machine::USUAL_MACHINE)
             .0
             .ok_or_else(|| anyhow::anyhow!("the built-in machine file cannot be read: please report this"))?,
     };
-    let board = pins::fit(&mut machine_file, args.machine.board.map(Board::profile).as_ref())?;
-    let machine = wiring::machine(&machine_file)?;
+    let board = demo_machine::fit(&mut machine_file, args.machine.board.map(Board::profile).as_ref())?;
+    let machine = demo_machine::machine(&machine_file)?;
     let name = board.name;
     let printer = VirtualPrinter::new(board, &machine, &args.machine.faults(), args.machine.seed, ())?;
     let stop = Arc::new(AtomicBool::new(false));

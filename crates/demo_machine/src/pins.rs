@@ -38,10 +38,7 @@ fn pins(config: &mut PrinterConfig) -> Vec<(&mut PinSpec, bool)> {
 
 /// The board that was asked for, or else the first that has the file's pins. Where a board was asked for that has none
 /// of them, the file's pins are replaced by pins that it has.
-pub(crate) fn fit(
-    config: &mut PrinterConfig,
-    wanted: Option<&BoardProfile>,
-) -> Result<BoardProfile, PrinterError> {
+pub fn fit(config: &mut PrinterConfig, wanted: Option<&BoardProfile>) -> Result<BoardProfile, PrinterError> {
     let mut named = pins(config);
     let unknown = |board: &BoardProfile, pins: &[(&mut PinSpec, bool)]| {
         pins.iter().filter(|(pin, _)| board.pin(&pin.name).is_none()).count()
@@ -93,7 +90,7 @@ mod tests {
     use super::*;
 
     fn sample() -> PrinterConfig {
-        printer::config::parse(crate::virtual_printer::USUAL_MACHINE).0.unwrap()
+        printer::config::parse(crate::USUAL_MACHINE).0.unwrap()
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 use printer::{
     config::{HeaterConfig, MotorConfig, PinSpec, PrinterConfig, StepperConfig},
+    error::{ErrorCode, PrinterError},
     machine::{EXTRUDER, MOTOR_NAMES},
 };
 use units::{Celsius, Mm, Ohms};
@@ -23,8 +24,8 @@ const FRAME_MARGIN_MM: f64 = 3.0;
 /// Where a sensor's curve is taken from the machine file.
 const CURVE_POINTS_C: [f64; 3] = [25.0, 150.0, 250.0];
 
-/// Builds the machine that a file describes.
-pub(crate) fn machine(config: &PrinterConfig) -> anyhow::Result<Machine> {
+/// Builds the machine that a file describes. An error where the file has a part that cannot be simulated.
+pub fn machine(config: &PrinterConfig) -> Result<Machine, PrinterError> {
     let mut machine = Machine::default();
     for (axis, stepper) in config.steppers.iter().enumerate() {
         machine.motors.push(axis_motor(axis, stepper));
@@ -93,18 +94,18 @@ fn motor(
     }
 }
 
-fn heater(config: &HeaterConfig, plant: Plant) -> anyhow::Result<Heater> {
+fn heater(config: &HeaterConfig, plant: Plant) -> Result<Heater, PrinterError> {
     let divider = &config.thermistor;
     let points = CURVE_POINTS_C.map(|celsius| {
         let ohms = divider.curve.resistance(Celsius(celsius)).0 + divider.inline.0;
         (Celsius(celsius), Ohms(ohms))
     });
     let Some(thermistor) = Thermistor::steinhart_hart(points) else {
-        anyhow::bail!(
+        let detail = format!(
             "[{}] sensor_type: {} cannot be simulated: only sensors whose resistance falls with temperature (NTC) can",
-            config.name,
-            config.sensor_type
+            config.name, config.sensor_type
         );
+        return Err(PrinterError::new(ErrorCode::ConfigUnsupported, detail));
     };
     Ok(Heater {
         name: config.name.clone(),
@@ -119,4 +120,29 @@ fn heater(config: &HeaterConfig, plant: Plant) -> anyhow::Result<Heater> {
 
 fn wire(pin: &PinSpec) -> Wire {
     Wire::new(pin.name.clone(), pin.inverted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use printer::config;
+
+    #[test]
+    fn the_usual_machine_is_wired_part_for_part() {
+        let config = config::parse(crate::USUAL_MACHINE).0.unwrap();
+        let built = machine(&config).unwrap();
+        let names: Vec<_> = built.motors.iter().map(|motor| motor.name.as_str()).collect();
+        assert_eq!(names, MOTOR_NAMES);
+        assert_eq!(built.endstops.len(), 3);
+        assert_eq!(built.heaters.len(), config.heaters().count());
+        for (motor, distance) in built.motors.iter().zip(printer::machine::step_distances(&config)) {
+            assert_eq!(motor.step_distance, distance);
+        }
+        for (endstop, stepper) in built.endstops.iter().zip(&config.steppers) {
+            let motor = &built.motors[endstop.motor];
+            let (low, high) = motor.frame.unwrap();
+            assert!(low < endstop.position && endstop.position < high);
+            assert_ne!(motor.start, stepper.position_endstop);
+        }
+    }
 }

@@ -1,0 +1,251 @@
+//! From moves to vertices.
+//!
+//! Knows what moves, comments and filament mean to an onlooker; knows no limits and no speeds. One vertex is held back,
+//! because what happens on the spot is said of the vertex already there. Lengths in mm.
+
+use gcode::{Annotation, Move};
+
+use super::layers::Layers;
+use super::vertex::{FEATURES, Flags, Grid, Vertex, feature_number, height_units, width_units};
+
+/// The most vertices of a file: 4 GiB of them.
+pub const VERTICES_MAX: u32 = 1 << 28;
+/// A line's number is told for one vertex in so many.
+const MARK_INTERVAL: u32 = 32;
+/// Places nearer than this are the same.
+const SAME_PLACE_MM: f64 = 1e-6;
+/// A loop has at least so many segments.
+const LOOP_SEGMENTS_MIN: u32 = 3;
+/// A loop's ends are this near each other where its width is not known.
+const LOOP_GAP_MM: f64 = 0.5;
+/// The feature before a file names one.
+const FEATURE_UNNAMED: u8 = 16;
+const OUTER_WALL: u8 = 1;
+const OVERHANG_WALL: u8 = 2;
+
+/// What a segment is counted under.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Segment {
+    /// It lays no filament, or goes nowhere.
+    Travel,
+    /// It lays filament for this feature.
+    Extrusion(u8),
+}
+
+/// An outer wall that is being laid.
+#[derive(Clone, Copy, Debug)]
+struct Loop {
+    start_mm: [f64; 3],
+    segments: u32,
+}
+
+/// Makes vertices.
+#[derive(Debug)]
+pub(super) struct Encoder {
+    grid: Grid,
+    filament_area_mm2: f64,
+    held: Option<Vertex>,
+    /// Where the held vertex is.
+    at_mm: [f64; 3],
+    /// The way to the next place is not known.
+    broken: bool,
+    feature: u8,
+    /// As the file's comments say.
+    width_mm: Option<f64>,
+    height_mm: Option<f64>,
+    tool: u32,
+    wall: Option<Loop>,
+    next_mark: u32,
+    /// Vertices, the held one among them.
+    pub(super) count: u32,
+    pub(super) clamped: u64,
+    pub(super) left_out: u64,
+    pub(super) layers: Layers,
+    pub(super) filament_mm: [f64; FEATURES],
+    /// Pairs of a line and the vertex at which its segment ends.
+    pub(super) marks: Vec<u32>,
+}
+
+const fn place(position: gcode::Position) -> [f64; 3] {
+    [position.x, position.y, position.z]
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let [x, y, z] = [0, 1, 2].map(|axis| a[axis] - b[axis]);
+    libm::sqrt(x * x + y * y + z * z)
+}
+
+impl Encoder {
+    pub(super) fn new(grid: Grid, filament_area_mm2: f64) -> Self {
+        Self {
+            grid,
+            filament_area_mm2,
+            held: None,
+            at_mm: [0.0; 3],
+            broken: false,
+            feature: FEATURE_UNNAMED,
+            width_mm: None,
+            height_mm: None,
+            tool: 0,
+            wall: None,
+            next_mark: 0,
+            count: 0,
+            clamped: 0,
+            left_out: 0,
+            layers: Layers::new(),
+            filament_mm: [0.0; FEATURES],
+            marks: Vec::new(),
+        }
+    }
+
+    pub(super) const fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The head goes somewhere by a way that no move describes.
+    pub(super) fn lose_way(&mut self) {
+        self.broken = true;
+    }
+
+    pub(super) fn select_tool(&mut self, tool: u32) {
+        self.tool = tool;
+    }
+
+    pub(super) fn annotate(&mut self, annotation: &Annotation) {
+        match annotation {
+            Annotation::Feature(feature) => self.feature = feature_number(*feature),
+            Annotation::LayerChange | Annotation::Layer(_) => self.layers.announce(),
+            Annotation::Width(width) => self.width_mm = Some(width.0),
+            Annotation::Height(height) => self.height_mm = Some(height.0),
+            _ => {}
+        }
+    }
+
+    /// Takes a move, appends vertices to `out`, and says what the move is.
+    pub(super) fn mv(&mut self, mv: &Move, out: &mut Vec<u32>) -> Segment {
+        let (from, to) = (place(mv.from), place(mv.to));
+        let filament = mv.to.e - mv.from.e;
+        let length = distance(from, to);
+        if length < SAME_PLACE_MM {
+            if filament != 0.0 {
+                self.end_wall();
+                let flag = if filament < 0.0 { Flags::RETRACT } else { Flags::UNRETRACT };
+                self.start_from(from, out);
+                if let Some(held) = &mut self.held {
+                    held.flags = held.flags.and(flag);
+                }
+            }
+            return Segment::Travel;
+        }
+        let extrudes = filament > 0.0;
+        self.follow_wall(extrudes, from);
+        self.start_from(from, out);
+        let layer = self.layers.segment(self.count, extrudes, to[2]);
+        let mut flags = Flags::default();
+        if !extrudes {
+            flags = Flags::TRAVEL;
+        }
+        if filament < 0.0 {
+            flags = flags.and(Flags::RETRACT).and(Flags::WIPE);
+        }
+        let (width, height) = if extrudes { self.bead(filament, length) } else { (0.0, 0.0) };
+        let vertex = Vertex {
+            width: width_units(width),
+            height: height_units(height),
+            feature: self.feature,
+            flags,
+            layer,
+            tool: self.tool,
+            ..Vertex::default()
+        };
+        self.hold(vertex, to, out);
+        self.mark(mv.line.0);
+        if !extrudes {
+            return Segment::Travel;
+        }
+        self.filament_mm[usize::from(self.feature).min(FEATURES - 1)] += filament;
+        Segment::Extrusion(self.feature)
+    }
+
+    /// The bead's width and height; 0 where they are not known.
+    fn bead(&self, filament: f64, length: f64) -> (f64, f64) {
+        let Some(height) = self.height_mm.or_else(|| self.layers.height_mm()) else {
+            return (self.width_mm.unwrap_or(0.0), 0.0);
+        };
+        // A bead has the section of a rectangle with half circles at its ends.
+        let section = filament * self.filament_area_mm2 / length;
+        let by_volume = section / height + height * (1.0 - core::f64::consts::FRAC_PI_4);
+        (self.width_mm.unwrap_or(by_volume), height)
+    }
+
+    /// Makes sure that the held vertex is where the next segment starts.
+    fn start_from(&mut self, from: [f64; 3], out: &mut Vec<u32>) {
+        let is_there = self.held.is_some() && !self.broken && distance(self.at_mm, from) < SAME_PLACE_MM;
+        if !is_there {
+            let layer = self.layers.number();
+            let vertex = Vertex {
+                flags: Flags::BREAK.and(Flags::TRAVEL),
+                feature: self.feature,
+                layer,
+                tool: self.tool,
+                ..Vertex::default()
+            };
+            self.hold(vertex, from, out);
+            self.broken = false;
+        }
+    }
+
+    fn hold(&mut self, vertex: Vertex, place_mm: [f64; 3], out: &mut Vec<u32>) {
+        if self.count >= VERTICES_MAX {
+            self.left_out += 1;
+            return;
+        }
+        self.release(out);
+        let (steps, inside) = self.grid.steps(place_mm);
+        self.clamped += u64::from(!inside);
+        self.held = Some(Vertex { steps, ..vertex });
+        self.at_mm = place_mm;
+        self.count += 1;
+    }
+
+    fn release(&mut self, out: &mut Vec<u32>) {
+        if let Some(vertex) = self.held.take() {
+            out.extend_from_slice(&vertex.pack());
+        }
+    }
+
+    fn mark(&mut self, line: u32) {
+        if self.count > self.next_mark {
+            self.marks.extend_from_slice(&[line, self.count - 1]);
+            self.next_mark = self.count - 1 + MARK_INTERVAL;
+        }
+    }
+
+    fn follow_wall(&mut self, extrudes: bool, from: [f64; 3]) {
+        let is_wall =
+            extrudes && (self.feature == OUTER_WALL || self.feature == OVERHANG_WALL && self.wall.is_some());
+        if !is_wall {
+            self.end_wall();
+            return;
+        }
+        self.wall.get_or_insert(Loop { start_mm: from, segments: 0 }).segments += 1;
+    }
+
+    /// A wall has ended at the held vertex. Where it ends at its start, that is its seam.
+    fn end_wall(&mut self) {
+        let Some(wall) = self.wall.take() else { return };
+        let gap = self.width_mm.unwrap_or(LOOP_GAP_MM);
+        if wall.segments >= LOOP_SEGMENTS_MIN
+            && distance(self.at_mm, wall.start_mm) <= gap
+            && let Some(held) = &mut self.held
+        {
+            held.flags = held.flags.and(Flags::SEAM);
+        }
+    }
+
+    /// No more moves come.
+    pub(super) fn finish(&mut self, out: &mut Vec<u32>) {
+        self.end_wall();
+        self.release(out);
+    }
+}

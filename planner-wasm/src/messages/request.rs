@@ -1,0 +1,190 @@
+//! What the page asks of a session.
+
+use std::collections::BTreeSet;
+
+use printer::session::{JobOptions, Request};
+use serde::Deserialize;
+use units::Celsius;
+
+use super::HeaterName;
+
+/// An axis that can be jogged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
+#[serde(rename_all = "lowercase")]
+pub enum JogAxis {
+    /// Across.
+    X,
+    /// Along.
+    Y,
+    /// Up.
+    Z,
+}
+
+/// What the page may ask.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
+#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum UiRequest {
+    /// Lines of G-code, typed by a user.
+    Gcode {
+        /// The lines.
+        text: String,
+    },
+    /// A heater's target.
+    SetTemperature {
+        /// Which one.
+        heater: HeaterName,
+        /// 0 is off.
+        target_c: f64,
+    },
+    /// The part fan's speed.
+    SetFan {
+        /// 0 … 1.
+        speed: f64,
+    },
+    /// The speed of everything that is planned from now on.
+    SetSpeedFactor {
+        /// 1 is as written.
+        factor: f64,
+    },
+    /// The extrusion of everything that is planned from now on.
+    SetFlowFactor {
+        /// 1 is as written.
+        factor: f64,
+    },
+    /// Finds the endstops of these axes; none named means all.
+    Home {
+        /// Which ones.
+        axes: Vec<JogAxis>,
+    },
+    /// Moves an axis from where it is. Positions in the console are absolute afterwards (`G90`).
+    Jog {
+        /// Which one.
+        axis: JogAxis,
+        /// How far; negative is towards lower positions.
+        distance_mm: f64,
+        /// How fast.
+        speed_mm_s: f64,
+    },
+    /// Pushes filament, or pulls it back.
+    Extrude {
+        /// How much; negative pulls it back.
+        length_mm: f64,
+        /// How fast.
+        speed_mm_s: f64,
+    },
+    /// Motors without current; positions are lost.
+    MotorsOff,
+    /// The job comes to rest and waits.
+    Pause,
+    /// The job goes on.
+    Resume,
+    /// The job comes to rest and ends; heaters and fan go off.
+    Cancel,
+    /// Everything stops at once.
+    EmergencyStop,
+    /// The board starts anew.
+    FirmwareRestart,
+}
+
+impl From<UiRequest> for Request {
+    fn from(request: UiRequest) -> Self {
+        match request {
+            UiRequest::Gcode { text } => Self::Gcode(text),
+            UiRequest::SetTemperature { heater, target_c } => {
+                Self::SetTemperature(heater.heater(), Celsius(target_c))
+            }
+            UiRequest::SetFan { speed } => Self::SetFan(speed),
+            UiRequest::SetSpeedFactor { factor } => Self::SetSpeedFactor(factor),
+            UiRequest::SetFlowFactor { factor } => Self::SetFlowFactor(factor),
+            UiRequest::Home { axes } => {
+                let words: String = axes.iter().map(|axis| format!(" {}", letter(*axis))).collect();
+                Self::Gcode(format!("G28{words}"))
+            }
+            UiRequest::Jog { axis, distance_mm, speed_mm_s } => {
+                Self::Gcode(relative_move(letter(axis), distance_mm, speed_mm_s))
+            }
+            UiRequest::Extrude { length_mm, speed_mm_s } => {
+                Self::Gcode(relative_move('E', length_mm, speed_mm_s))
+            }
+            UiRequest::MotorsOff => Self::Gcode("M84".to_owned()),
+            UiRequest::Pause => Self::Pause,
+            UiRequest::Resume => Self::Resume,
+            UiRequest::Cancel => Self::Cancel,
+            UiRequest::EmergencyStop => Self::EmergencyStop,
+            UiRequest::FirmwareRestart => Self::FirmwareRestart,
+        }
+    }
+}
+
+const fn letter(axis: JogAxis) -> char {
+    match axis {
+        JogAxis::X => 'X',
+        JogAxis::Y => 'Y',
+        JogAxis::Z => 'Z',
+    }
+}
+
+/// Numbers are written plainly, without exponents, and to a micrometre.
+fn relative_move(letter: char, distance_mm: f64, speed_mm_s: f64) -> String {
+    format!("G91\nG1 {letter}{distance_mm:.3} F{:.3}\nG90", speed_mm_s * 60.0)
+}
+
+/// What a job is started with.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+pub struct JobRequest {
+    /// Lines with something blocking in them that the user has confirmed: they are passed over.
+    pub confirmed_lines: Vec<u32>,
+    /// Confirm all of them.
+    pub confirm_all: bool,
+}
+
+impl From<JobRequest> for JobOptions {
+    fn from(request: JobRequest) -> Self {
+        let confirmed_lines: BTreeSet<u32> = request.confirmed_lines.into_iter().collect();
+        Self { confirmed_lines, confirm_all: request.confirm_all }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gcode::Heater;
+
+    fn request(json: &str) -> Request {
+        serde_json::from_str::<UiRequest>(json).unwrap().into()
+    }
+
+    #[test]
+    fn requests_are_read_as_the_page_writes_them() {
+        assert_eq!(request(r#"{"type":"pause"}"#), Request::Pause);
+        assert_eq!(request(r#"{"type":"emergency-stop"}"#), Request::EmergencyStop);
+        assert_eq!(
+            request(r#"{"type":"set-temperature","heater":"extruder","target_c":210}"#),
+            Request::SetTemperature(Heater::Tool(0), Celsius(210.0))
+        );
+        assert_eq!(request(r#"{"type":"home","axes":["x","y"]}"#), Request::Gcode("G28 X Y".into()));
+        assert_eq!(request(r#"{"type":"home","axes":[]}"#), Request::Gcode("G28".into()));
+        assert_eq!(
+            request(r#"{"type":"jog","axis":"z","distance_mm":-1e-1,"speed_mm_s":10}"#),
+            Request::Gcode("G91\nG1 Z-0.100 F600.000\nG90".into())
+        );
+    }
+
+    #[test]
+    fn what_is_not_known_is_refused() {
+        for json in [
+            r#"{"type":"explode"}"#,
+            r#"{"type":"jog","axis":"q","distance_mm":1,"speed_mm_s":1}"#,
+            r#"{"type":"gcode","text":"G28","also":1}"#,
+            r#"{"type":"set-fan"}"#,
+            "pause",
+            "",
+        ] {
+            assert!(serde_json::from_str::<UiRequest>(json).is_err(), "{json}");
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! A file's geometry and summary for JavaScript.
+
+use printer::{
+    error::{ErrorCode, PrinterError},
+    preview,
+};
+use wasm_bindgen::prelude::{JsError, wasm_bindgen};
+
+use crate::{
+    messages::{PreviewSummary, json},
+    read_config, thrown,
+};
+
+/// Reads a file: feed what it wants, take vertices until there are none, and so on; then finish, take the last ones, and
+/// ask for the summary.
+#[wasm_bindgen]
+pub struct Preview {
+    reader: Option<preview::Preview>,
+    origin_mm: [f64; 3],
+    step_mm: f64,
+    read_bytes: u64,
+    summary: String,
+}
+
+#[wasm_bindgen]
+impl Preview {
+    /// A preview for a machine, or of the G-code alone.
+    #[wasm_bindgen(constructor)]
+    pub fn new(printer_cfg: Option<String>) -> Result<Preview, JsError> {
+        let config = printer_cfg.map(|text| read_config(&text)).transpose();
+        let config = config.map_err(|error| thrown(&error))?;
+        let reader = preview::Preview::new(config.as_ref());
+        let grid = *reader.grid();
+        Ok(Self {
+            reader: Some(reader),
+            origin_mm: grid.origin_mm,
+            step_mm: grid.step_mm,
+            read_bytes: 0,
+            summary: String::new(),
+        })
+    }
+
+    /// Where the vertices' step 0, 0, 0 is, in mm.
+    #[wasm_bindgen(getter)]
+    pub fn origin_mm(&self) -> Vec<f64> {
+        self.origin_mm.to_vec()
+    }
+
+    /// How long a step of the vertices is, in mm.
+    #[wasm_bindgen(getter)]
+    pub fn step_mm(&self) -> f64 {
+        self.step_mm
+    }
+
+    /// How many bytes may be fed now. All of them may, once there are no vertices to be taken.
+    pub fn wants(&self) -> usize {
+        self.reader.as_ref().map_or(0, preview::Preview::wants)
+    }
+
+    /// Takes the next bytes of the file, at most what it wants.
+    pub fn feed(&mut self, chunk: &[u8]) -> Result<(), JsError> {
+        let taken = self.reader.as_mut().map_or(0, |reader| reader.feed(chunk));
+        if taken == chunk.len() {
+            return Ok(());
+        }
+        let detail = format!("{} bytes more than wanted were fed to the preview", chunk.len() - taken);
+        Err(thrown(&PrinterError::new(ErrorCode::Internal, detail)))
+    }
+
+    /// Says that the file has ended.
+    pub fn finish(&mut self) {
+        if let Some(reader) = &mut self.reader {
+            reader.end();
+        }
+    }
+
+    /// Works on what was fed, and returns vertices, some 256 Ki at most; an empty array says that all is done. Each is four
+    /// words, by `docs/vertex.md`.
+    pub fn take_vertices(&mut self) -> Vec<u32> {
+        let mut vertices = Vec::new();
+        if let Some(reader) = &mut self.reader {
+            while reader.run(&mut vertices) && vertices.is_empty() {}
+            self.read_bytes = reader.read_bytes();
+        }
+        vertices
+    }
+
+    /// Pairs of a line and the vertex at which its segment ends, one for some dozens of vertices, in order; what is new
+    /// since the last call.
+    pub fn take_marks(&mut self) -> Vec<u32> {
+        self.reader.as_mut().map(preview::Preview::take_marks).unwrap_or_default()
+    }
+
+    /// Bytes of the file that have been read.
+    #[wasm_bindgen(getter)]
+    pub fn progress(&self) -> f64 {
+        self.read_bytes as f64
+    }
+
+    /// What the file holds: a `PreviewSummary` as JSON. Ends the reading.
+    pub fn summary(&mut self) -> String {
+        if let Some(reader) = self.reader.take() {
+            self.summary = json(&PreviewSummary::of(reader.finish()));
+        }
+        self.summary.clone()
+    }
+}

@@ -1,0 +1,6 @@
+// Generated from planner-wasm/src/messages by `cargo xtask bindings`. Do not edit.
+
+/**
+ * How much a remark matters.
+ */
+export type ConfigSeverity = "info" | "warning" | "error";

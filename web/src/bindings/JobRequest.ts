@@ -1,0 +1,14 @@
+// Generated from planner-wasm/src/messages by `cargo xtask bindings`. Do not edit.
+
+/**
+ * What a job is started with.
+ */
+export type JobRequest = { 
+/**
+ * Lines with something blocking in them that the user has confirmed: they are passed over.
+ */
+confirmed_lines: Array<number>, 
+/**
+ * Confirm all of them.
+ */
+confirm_all: boolean, };

@@ -1,0 +1,24 @@
+// Generated from planner-wasm/src/messages by `cargo xtask bindings`. Do not edit.
+import type { JobPhase } from './JobPhase';
+import type { Bytes, Seconds } from './units';
+
+/**
+ * A job; the numbers of the last one stay after its end.
+ */
+export type JobView = { 
+/**
+ * What it is doing.
+ */
+status: JobPhase, 
+/**
+ * The line of the last move that has been made.
+ */
+line: number, 
+/**
+ * Print time so far.
+ */
+elapsed_s: Seconds, 
+/**
+ * How much of its file has been taken; a double counts bytes exactly up to 2⁵³.
+ */
+fed_bytes: Bytes, };
