@@ -15,7 +15,7 @@ import { answerTrouble, plannerMissing, portInUse, portTrouble, workerDied } fro
 
 /** How often the page is told how things are, in ms. */
 const TELL_MS = 100;
-/** Gaps between tellings longer than this are told. */
+/** Errors for which the first bytes may know a better reason. */
 const UNIDENTIFIED = new Set(['board-silent', 'wrong-firmware']);
 
 interface Connection {
@@ -98,14 +98,20 @@ async function connectSerial(
   if (!port) throw new PortError('port-gone');
   const name = `stepcast-port:${choice.id.vendor}:${choice.id.product}:${choice.id.index}`;
   const held = await withLock(name, async () => {
-    const transport = await openSerial(port, choice.baud);
+    // Before the port is touched: the machine's file may have errors.
+    const session = loaded.openSession(config, realNow());
+    const transport = await openSerial(port, choice.baud).catch((error: unknown) => {
+      session.free();
+      throw error;
+    });
     if (opening?.cancelled) {
+      session.free();
       await transport.close();
+      tell({ kind: 'closed', trouble: null });
       return;
     }
     const first = new FirstBytes();
     await hold((over) => {
-      const session = loaded.openSession(config, realNow());
       const machine = new Machine(
         session,
         (message) => tell(first.explain(message)),

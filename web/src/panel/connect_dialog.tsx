@@ -2,8 +2,8 @@
 import { signal } from '@preact/signals';
 import type { JSX } from 'preact';
 import { useEffect } from 'preact/hooks';
-import { connect, plannerLoaded, refusePort } from '../state/machine';
-import { activeProfile, profiles } from '../state/profiles';
+import { connect, plannerFailed, plannerLoaded, refusePort } from '../state/machine';
+import { activeProfile, profiles, SHIPPED } from '../state/profiles';
 import { change, SPEED_MAX, settings } from '../state/settings';
 import { identify, type PortId } from '../transport/web_serial';
 import { machineSummary } from './machine_summary';
@@ -120,6 +120,7 @@ function Virtual(): JSX.Element {
 }
 
 function obstacle(isSerial: boolean): string | null {
+  if (plannerFailed.value) return 'The planner could not be loaded.';
   if (!plannerLoaded.value) return 'The planner is still loading.';
   if (!machineSummary.value) return 'The machine file has errors: mend it under Machine.';
   return isSerial && !chosen.value ? 'Choose a port first.' : null;
@@ -170,6 +171,12 @@ export function ConnectDialog(): JSX.Element {
             ))}
           </select>
         </label>
+        {isSerial && activeProfile.value.config === SHIPPED.config && (
+          <p class="hint">
+            This is the sample machine’s file. For a printer of your own, open its printer.cfg under Machine
+            first.
+          </p>
+        )}
         {isSerial ? <Ports /> : <Virtual />}
         <div class="dialog-foot">
           {why && <p class="hint">{why}</p>}

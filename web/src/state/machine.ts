@@ -16,6 +16,8 @@ import { note } from './log';
 export type ConnectionState = 'closed' | 'opening' | 'open';
 
 export const plannerLoaded = signal(false);
+/** The planner cannot be loaded: nothing but the shell will work. */
+export const plannerFailed = signal(false);
 export const connection = signal<ConnectionState>('closed');
 export const port = signal<PortChoice | null>(null);
 export const snapshot = signal<Snapshot | null>(null);
@@ -46,6 +48,7 @@ export function startMachine(): void {
 const send = (message: ToMachine): void => worker?.postMessage(message);
 
 function closed(reason: Trouble | null): void {
+  const wasOpen = connection.value !== 'closed';
   if (isPrinting.value) outcome.value = 'stopped';
   connection.value = 'closed';
   port.value = null;
@@ -54,7 +57,8 @@ function closed(reason: Trouble | null): void {
   for (const settle of waiting.values()) settle(null);
   waiting.clear();
   if (reason) report(reason);
-  note('info', 'Disconnected.');
+  if (reason?.code === 'planner-missing') plannerFailed.value = true;
+  if (wasOpen) note('info', 'Disconnected.');
 }
 
 function report(reason: Trouble): void {
