@@ -221,7 +221,7 @@ impl Checker {
         let Some(limits) = limits else {
             // Switching off what is not there is what many files end with.
             if target > Celsius::ZERO {
-                let detail = format!("{heater:?} is not in the machine file");
+                let detail = format!("{} is not in the machine file", machine::heater_name(heater));
                 self.error(ErrorCode::NoSuchHeater, detail, Some(line.0));
             }
             return;

@@ -17,6 +17,16 @@ pub const MOTORS: usize = 4;
 /// The motors' names, as in the machine file.
 pub const MOTOR_NAMES: [&str; MOTORS] = ["stepper_x", "stepper_y", "stepper_z", "extruder"];
 
+/// What a machine file calls a heater.
+pub fn heater_name(heater: gcode::Heater) -> String {
+    match heater {
+        gcode::Heater::Tool(0) => "extruder".to_owned(),
+        gcode::Heater::Tool(tool) => format!("extruder{tool}"),
+        gcode::Heater::Bed => "heater_bed".to_owned(),
+        gcode::Heater::Chamber => "the chamber heater".to_owned(),
+    }
+}
+
 /// The index of the extruder's motor.
 pub const EXTRUDER: usize = 3;
 

@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use gcode::LineNumber;
 use steps::{StepCommand, StepCommandKind};
 use units::{Seconds, Ticks};
 use wire::Command;
@@ -31,7 +32,7 @@ pub(super) enum Due {
     /// The machine gets to the end of a move.
     MoveEnd(ScheduledMove),
     /// A line's action.
-    Action(TimedAction),
+    Action(LineNumber, TimedAction),
 }
 
 /// A run of motion on the board's clock.
@@ -42,6 +43,13 @@ pub(super) struct Run {
     pub(super) end: Option<Ticks>,
     /// Whether it belongs to homing, which is no print time.
     pub(super) homing: bool,
+}
+
+impl Run {
+    /// A clock of the run on the board's clock; what lies beyond all clocks stays there.
+    fn clock(&self, ticks: Ticks) -> Ticks {
+        Ticks(self.start.0.saturating_add(ticks.0))
+    }
 }
 
 /// What has to be said to a motor before its next steps.
@@ -58,6 +66,8 @@ pub(super) struct MotionStream {
     pending: [Pending; MOTORS],
     timeline: VecDeque<(Ticks, Due)>,
     enabled: [bool; MOTORS],
+    /// The clock at which each motor's driver was last switched: the next switch must come later.
+    switched: [Ticks; MOTORS],
     /// Print time of the runs that have ended.
     elapsed: Seconds,
 }
@@ -87,7 +97,7 @@ impl MotionStream {
         let has_room = |motor| board.link.room(Lane::Motion(motor as u8)) >= LANE_ROOM_MIN;
         self.timeline.len() < TIMELINE_MAX
             && (0..MOTORS).all(has_room)
-            && self.run.is_none_or(|run| run.start + generated_until < clock_now + board.ticks(HORIZON))
+            && self.run.is_none_or(|run| run.clock(generated_until) < clock_now + board.ticks(HORIZON))
     }
 
     /// Whether the motion planned so far ends soon.
@@ -97,7 +107,10 @@ impl MotionStream {
 
     /// A run starts as soon as the link allows.
     pub(super) fn start_run(&mut self, board: &Board, now: Seconds, homing: bool) -> Run {
-        let run = Run { start: board.run_clock(now), end: None, homing };
+        // A driver that has just been switched off is first on again.
+        let switched = self.switched.iter().fold(Ticks(0), |last, &clock| last.max(clock));
+        let start = board.run_clock(now).max(switched + board.ticks(ENABLE_LEAD * 2.0));
+        let run = Run { start, end: None, homing };
         self.run = Some(run);
         self.pending = [Pending { reset: true, forward: None }; MOTORS];
         run
@@ -110,7 +123,13 @@ impl MotionStream {
         }
         self.enabled[motor] = true;
         let clock = at.saturating_sub(board.ticks(ENABLE_LEAD));
+        self.switched[motor] = clock;
         Self::switch_driver(motor, true, clock, board);
+    }
+
+    /// Whether any driver is on.
+    pub(super) fn any_enabled(&self) -> bool {
+        self.enabled.contains(&true)
     }
 
     /// Switches drivers off, at rest.
@@ -118,6 +137,8 @@ impl MotionStream {
         let clock = board.output_clock(now);
         for motor in (0..MOTORS).filter(|&motor| motors[motor]) {
             if core::mem::take(&mut self.enabled[motor]) {
+                let clock = clock.max(self.switched[motor] + Ticks(1));
+                self.switched[motor] = clock;
                 Self::switch_driver(motor, false, clock, board);
             }
         }
@@ -211,7 +232,7 @@ impl MotionStream {
         board: &Board,
     ) -> Option<Seconds> {
         let run = self.run?;
-        let generated = run.end.unwrap_or(run.start + generated_until);
+        let generated = run.end.unwrap_or(run.clock(generated_until));
         let until = board.link.motion_covered().map_or(generated, |covered| covered.min(generated));
         Some(board.clock.duration_of(until.saturating_sub(clock_now)))
     }
