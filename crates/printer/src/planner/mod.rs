@@ -132,9 +132,9 @@ impl Planner {
         self.planned_until
     }
 
-    /// Run clock up to which step commands have been handed out.
-    pub fn generated_until(&self) -> Ticks {
-        self.generator.settled()
+    /// Run clock up to which step commands have been handed out; `None` once all of the run's have been.
+    pub fn generated_until(&self) -> Option<Ticks> {
+        Some(self.generator.settled()).filter(|&settled| settled != Ticks(u64::MAX))
     }
 
     /// What the step generator counted so far.
@@ -171,11 +171,15 @@ impl Planner {
         source.e_offset += filament_mm;
     }
 
-    /// The machine file's limits hold again, whatever a source asked for.
-    pub fn reset_limits(&mut self) {
+    /// As [`Self::adopt`], for a job, whose plan is to depend on nothing that was done before: the machine file's limits
+    /// hold again, and the filament counts from 0. At rest.
+    pub fn begin_job(&mut self, source: &mut Source) {
+        debug_assert!(self.is_at_rest(), "a job begins at rest");
+        self.position[EXTRUDER] = 0.0;
         self.limits = self.machine_limits;
         // They have been checked when the planner was made.
         let _ = self.look_ahead.set_limits(self.limits);
+        self.adopt(source);
     }
 
     /// A move could not be turned into steps, so that the run cannot be brought to rest: everything has to stop.

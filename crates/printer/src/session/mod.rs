@@ -171,7 +171,7 @@ impl Session {
             Stage::Connecting(connecting) => connecting.receive(bytes, now),
             Stage::Ready(ready) => {
                 if let Err(failure) = ready.receive(bytes, now) {
-                    self.on_failure(failure);
+                    self.on_failure(failure, now);
                 }
             }
             Stage::Shutdown(board) => {
@@ -187,7 +187,7 @@ impl Session {
         }
     }
 
-    fn on_failure(&mut self, failure: Failure) {
+    fn on_failure(&mut self, failure: Failure, now: Seconds) {
         let Stage::Ready(mut ready) = self.take_stage() else { return };
         self.events.append(&mut ready.events);
         match failure {
@@ -198,7 +198,14 @@ impl Session {
                 self.stopped(board, error.ending(Ended::Everything));
             }
             Failure::Shutdown(error) => self.stopped(ready.board, error),
-            Failure::Lost(error) => self.fail(error),
+            Failure::Lost(error) => {
+                if error.code == ErrorCode::LinkLost {
+                    // Perhaps only the way back is cut.
+                    let mut board = ready.board;
+                    self.part(&mut board, &Command::EmergencyStop {}, now);
+                }
+                self.fail(error);
+            }
         }
     }
 
@@ -227,7 +234,7 @@ impl Session {
             Stage::Ready(ready) => match ready.poll(now, out) {
                 Ok(wake) => wake,
                 Err(failure) => {
-                    self.on_failure(failure);
+                    self.on_failure(failure, now);
                     now
                 }
             },
@@ -289,13 +296,18 @@ impl Session {
     fn restart(&mut self, board: Option<Board>, now: Seconds) {
         if let Some(mut board) = board {
             self.restarts_left = self.restarts_left.saturating_sub(1);
-            board.link.forget_all();
-            board.immediate(&Command::Reset {});
-            let clock_now = board.clock_at(now);
-            board.link.poll(now, clock_now, &mut self.parting);
+            self.part(&mut board, &Command::Reset {}, now);
         }
         self.error = None;
         self.enter(Stage::Identifying(Box::new(Identifying::after_restart(now))));
+    }
+
+    /// A last command to a board that is then no longer listened to.
+    fn part(&mut self, board: &mut Board, command: &Command<'_>, now: Seconds) {
+        board.link.forget_all();
+        board.immediate(command);
+        let clock_now = board.clock_at(now);
+        board.link.poll(now, clock_now, &mut self.parting);
     }
 
     /// Counts of the link.

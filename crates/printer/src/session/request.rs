@@ -19,8 +19,8 @@ impl Session {
     /// Asks for something. What it leads to comes as events; an error means that nothing was done.
     pub fn request(&mut self, request: Request, now: Seconds) -> Result<(), PrinterError> {
         match request {
-            Request::EmergencyStop => return self.emergency_stop(),
-            Request::Gcode(text) if is_emergency(&text) => return self.emergency_stop(),
+            Request::EmergencyStop => return self.emergency_stop(now),
+            Request::Gcode(text) if is_emergency(&text) => return self.emergency_stop(now),
             Request::FirmwareRestart => {
                 self.restart_wanted(now);
                 return Ok(());
@@ -50,12 +50,12 @@ impl Session {
     }
 
     /// Everything stops, whatever the session is doing. Refused where no board is known that could be told.
-    fn emergency_stop(&mut self) -> Result<(), PrinterError> {
+    fn emergency_stop(&mut self, now: Seconds) -> Result<(), PrinterError> {
         let error = PrinterError::from(ErrorCode::EmergencyStop);
         match self.take_stage() {
             Stage::Ready(ready) => {
                 self.stage = Stage::Ready(ready);
-                self.on_failure(Failure::Stop(error));
+                self.on_failure(Failure::Stop(error), now);
             }
             Stage::Connecting(connecting) => {
                 let mut board = connecting.board;
@@ -87,8 +87,7 @@ impl Session {
             return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
         }
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
-        ready.planner.adopt(&mut job.source);
-        ready.planner.reset_limits();
+        ready.planner.begin_job(&mut job.source);
         ready.last_active = now;
         ready.stream.reset_elapsed();
         job.told = now;

@@ -45,13 +45,6 @@ pub(super) struct Run {
     pub(super) homing: bool,
 }
 
-impl Run {
-    /// A clock of the run on the board's clock; what lies beyond all clocks stays there.
-    fn clock(&self, ticks: Ticks) -> Ticks {
-        Ticks(self.start.0.saturating_add(ticks.0))
-    }
-}
-
 /// What has to be said to a motor before its next steps.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pending {
@@ -92,12 +85,14 @@ impl MotionStream {
         self.elapsed = Seconds::ZERO;
     }
 
-    /// Whether the planner should be asked for more.
-    pub(super) fn wants_more(&self, generated_until: Ticks, clock_now: Ticks, board: &Board) -> bool {
+    /// Whether the planner should be asked for more. A run of which everything has been generated has yet to be ended.
+    pub(super) fn wants_more(&self, generated_until: Option<Ticks>, clock_now: Ticks, board: &Board) -> bool {
         let has_room = |motor| board.link.room(Lane::Motion(motor as u8)) >= LANE_ROOM_MIN;
         self.timeline.len() < TIMELINE_MAX
             && (0..MOTORS).all(has_room)
-            && self.run.is_none_or(|run| run.clock(generated_until) < clock_now + board.ticks(HORIZON))
+            && self.run.zip(generated_until).is_none_or(|(run, until)| {
+                run.start + until < clock_now + board.ticks(HORIZON)
+            })
     }
 
     /// Whether the motion planned so far ends soon.
@@ -227,12 +222,12 @@ impl MotionStream {
     /// or to the end of what has been generated. `None` where no run is being made.
     pub(super) fn queued_on_board(
         &self,
-        generated_until: Ticks,
+        generated_until: Option<Ticks>,
         clock_now: Ticks,
         board: &Board,
     ) -> Option<Seconds> {
         let run = self.run?;
-        let generated = run.end.unwrap_or(run.clock(generated_until));
+        let generated = run.end.or(generated_until.map(|until| run.start + until))?;
         let until = board.link.motion_covered().map_or(generated, |covered| covered.min(generated));
         Some(board.clock.duration_of(until.saturating_sub(clock_now)))
     }

@@ -29,8 +29,9 @@ const SAMPLE_INTERVAL: Seconds = Seconds(0.001);
 const SAMPLE_COUNT: u8 = 8;
 /// How many reports in a row may be out of range before the board stops everything.
 const RANGE_CHECKS: u8 = 4;
-/// A sensor that has not been heard of for this long is an error.
-const SILENCE_MAX: Seconds = Seconds(5.0);
+/// A sensor that has not been heard of for this long is an error: longer than it takes to notice that nobody is there.
+/// The board itself has switched the heater off by then.
+const SILENCE_MAX: Seconds = Seconds(8.0);
 /// The first reading comes this long after the configuration.
 const FIRST_REPORT: Seconds = Seconds(0.5);
 

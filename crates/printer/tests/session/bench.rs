@@ -90,8 +90,9 @@ pub(crate) struct Bench {
     ticks_per_s: f64,
     file: VecDeque<u8>,
     file_ended: bool,
-    /// The job's file is not fed.
-    pub(crate) withhold: bool,
+    /// No more than this much of the job's file is fed.
+    pub(crate) feed_max: usize,
+    fed: usize,
     /// The session is not called.
     pub(crate) stalled: bool,
     to_host: Vec<u8>,
@@ -116,7 +117,8 @@ impl Bench {
             events: Vec::new(),
             file: VecDeque::new(),
             file_ended: false,
-            withhold: false,
+            feed_max: usize::MAX,
+            fed: 0,
             stalled: false,
             to_host: Vec::new(),
         }
@@ -159,8 +161,10 @@ impl Bench {
         while !holds(self) {
             assert!(
                 self.now() < until,
-                "{what} did not come within {seconds_max} s; last events: {:#?}",
-                &self.remarkable()[self.remarkable().len().saturating_sub(12)..]
+                "{what} did not come within {seconds_max} s; {:?} {:?}; last events: {:?}",
+                self.session.phase(),
+                self.session.job_status(),
+                &self.remarkable()[self.remarkable().len().saturating_sub(6)..]
             );
             let next = until.min(self.now() + Seconds(0.02));
             self.round(next);
@@ -201,7 +205,8 @@ impl Bench {
 
     fn feed(&mut self) -> bool {
         let wants = self.session.job_wants();
-        if self.withhold || wants == 0 || self.session.job_status() == JobStatus::None {
+        let wants = wants.min(self.feed_max - self.fed);
+        if wants == 0 || self.session.job_status() == JobStatus::None {
             return false;
         }
         if self.file.is_empty() {
@@ -214,6 +219,7 @@ impl Bench {
         // Small pieces, so that lines are cut everywhere.
         let piece: Vec<u8> = self.file.drain(..self.file.len().min(wants).min(100)).collect();
         self.session.job_feed(&piece);
+        self.fed += piece.len();
         true
     }
 
@@ -257,12 +263,14 @@ impl Bench {
     #[track_caller]
     pub(crate) fn home(&mut self) {
         self.gcode("G28");
-        assert_eq!(self.session.position().unwrap().1, [true; 3], "{:?}", self.errors());
+        let position = self.session.position();
+        assert!(position.is_some_and(|(_, homed)| homed == [true; 3]), "{:?}", self.errors());
     }
 
     pub(crate) fn start_with(&mut self, file: &str, options: JobOptions) -> Result<(), PrinterError> {
         self.file = file.bytes().collect();
         self.file_ended = false;
+        self.fed = 0;
         let now = self.now();
         self.session.start_job(options, now)
     }

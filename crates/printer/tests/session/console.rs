@@ -99,7 +99,7 @@ fn motors_that_were_off_are_on_again_before_they_move() {
     assert_eq!(bench.session.position().unwrap().1, [false; 3]);
     assert!(bench.state().motors.iter().all(|motor| !motor.energised));
     bench.gcode("G1 X10");
-    bench.failed(ErrorCode::NotHomed, Some(5));
+    bench.failed(ErrorCode::NotHomed, Some(6));
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn heaters_are_named_as_in_the_machine_file() {
     assert!(error.detail.contains("extruder1") && !error.detail.contains("Tool"), "{error}");
     bench.events.clear();
     bench.gcode("M104 S300");
-    bench.failed(ErrorCode::TargetOutOfRange, Some(2));
+    bench.failed(ErrorCode::TargetOutOfRange, Some(1));
     bench.events.clear();
     // Switching off what is not there is what many files end with.
     bench.gcode("M141 S0\nM104 T1 S0\nM109 T1 S0");

@@ -126,8 +126,8 @@ fn a_job_is_not_resumed_cold_or_without_its_position() {
     bench.until("cold", 200.0, |bench| bench.celsius(0) < 55.0);
     assert_eq!(bench.request(Request::Resume).unwrap_err().code, ErrorCode::ColdExtrusion);
     assert_eq!(bench.session.job_status(), JobStatus::Paused);
-    bench.gcode("M109 S70");
-    bench.gcode("M84");
+    bench.gcode("M109 S70\nM84");
+    bench.until("motors off", 90.0, |bench| !bench.printer.state().motors[0].energised);
     assert_eq!(bench.request(Request::Resume).unwrap_err().code, ErrorCode::NotHomed);
     bench.gcode("G28");
     bench.ask(Request::Resume);

@@ -222,7 +222,11 @@ impl Ready {
             // Typed where there is no job, they mean nothing.
             Barrier::Pause(_) => drop(self.pause(now)),
             Barrier::Cancel => drop(self.cancel(now)),
-            Barrier::EmergencyStop => return Err(Failure::Stop(ErrorCode::EmergencyStop.into())),
+            Barrier::EmergencyStop => {
+                let detail = "M112 was carried out";
+                let error = PrinterError::new(ErrorCode::EmergencyStop, detail).at_line(line.0);
+                return Err(Failure::Stop(error));
+            }
         }
         Ok(matches!(self.wait, Wait::Nothing))
     }
