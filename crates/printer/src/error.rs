@@ -57,7 +57,8 @@ const NOTHING_MOVED: &str = "Nothing was sent to the printer: it did not move an
 const REFUSED: &str =
     "The command was not carried out. The printer waits where it was, its heaters as they were.";
 /// An axis could not be homed.
-const AXIS_STOPPED: &str = "The axis stands still, and its position is not known until it is homed. Heaters stay as they were.";
+const AXIS_STOPPED: &str =
+    "The axis stands still, and its position is not known until it is homed. Heaters stay as they were.";
 /// A job that ran has come to its end.
 const JOB_ENDED: &str = "The print has ended: the moves before that place were made, the motors stand still, the heaters \
                          and the fan are off.";

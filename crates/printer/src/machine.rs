@@ -43,6 +43,20 @@ pub fn step_distances(config: &PrinterConfig) -> [Mm; MOTORS] {
     [x, y, z, e]
 }
 
+/// The speed of each motor's axis at which it makes as many steps as can be told apart: pulses and the gaps between
+/// them last for `step_pulse_duration` at least.
+pub fn motor_speeds_max(config: &PrinterConfig, clock: Hertz) -> [MmPerS; MOTORS] {
+    let [x, y, z] = config.steppers.each_ref().map(|axis| axis.motor.step_pulse_duration);
+    let e = config.extruder.as_ref().map_or(Seconds::ZERO, |extruder| extruder.motor.step_pulse_duration);
+    let pulses = [x, y, z, e];
+    let distances = step_distances(config);
+    core::array::from_fn(|motor| {
+        let pulse_ticks = clock.ticks_in(pulses[motor]).0.max(1) as f64;
+        let rate = steps::step_rate_max(clock).min(f64::from(clock.0) / (2.0 * pulse_ticks));
+        MmPerS(distances[motor].0 * rate)
+    })
+}
+
 /// The planner's limits.
 pub fn limits(config: &PrinterConfig) -> Limits {
     let printer = &config.printer;

@@ -9,6 +9,8 @@ mod guard;
 mod item;
 mod report;
 mod source;
+#[cfg(test)]
+mod tests;
 
 use std::collections::VecDeque;
 
@@ -84,7 +86,7 @@ pub struct Planner {
     ready: VecDeque<Planned>,
     barrier: Option<(LineNumber, Barrier)>,
     said: Said,
-    /// The most steps a second that each motor can be asked for, in mm/s of its axis.
+    /// What each motor's driver can follow, as the speed of its axis.
     motor_speed_max: [MmPerS; MOTORS],
     is_broken: bool,
 }
@@ -111,8 +113,7 @@ impl Planner {
             ready: VecDeque::new(),
             barrier: None,
             said: Said::default(),
-            motor_speed_max: machine::step_distances(config)
-                .map(|distance| MmPerS(distance.0 * steps::step_rate_max(clock))),
+            motor_speed_max: machine::motor_speeds_max(config, clock),
             is_broken: false,
         })
     }
@@ -321,7 +322,8 @@ impl Planner {
             Action::Cancel => self.barrier = Some((line, Barrier::Cancel)),
             Action::PressureAdvance { .. } => {
                 if !core::mem::replace(&mut self.said.pressure_advance, true) {
-                    let text = "pressure advance is not applied by this version: the print is made without it";
+                    let text =
+                        "pressure advance is not applied by this version: the print is made without it";
                     self.notice(line, text);
                 }
             }
@@ -394,20 +396,19 @@ impl Planner {
         let [x, y, z, e] = self.position;
         let from = gcode::Position { x, y, z, e: e - e_offset };
         self.guard.judge(&Move { from, ..*mv })?;
-        self.judge_speed(to, mv)?;
         self.push(to, mv.feed, mv.line)
     }
 
     /// Refuses what no driver can step, by the highest speed that the limits leave. An extruder that moves along with
     /// the axes is judged when its steps are made: its junctions slow it down.
-    fn judge_speed(&self, to: Position, mv: &Move) -> Result<(), PrinterError> {
+    fn judge_speed(&self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
         let delta: [f64; MOTORS] = core::array::from_fn(|motor| to[motor] - self.position[motor]);
         let travel = delta[..3].iter().map(|d| d * d).sum::<f64>().sqrt();
         let limits = &self.limits;
         let (length, speed, motors) = if travel > 0.0 {
-            (travel, mv.feed.min(limits.max_velocity), 0..EXTRUDER)
+            (travel, feed.min(limits.max_velocity), 0..EXTRUDER)
         } else {
-            let speed = mv.feed.min(limits.extruder.max_extrude_only_velocity);
+            let speed = feed.min(limits.extruder.max_extrude_only_velocity);
             (delta[EXTRUDER].abs(), speed, EXTRUDER..MOTORS)
         };
         for motor in motors {
@@ -415,7 +416,7 @@ impl Planner {
             let z_bound = if motor == 2 { limits.max_z_velocity } else { speed };
             if share > 0.0 && z_bound.min(speed * share) > self.motor_speed_max[motor] {
                 let detail = format!("{} at {:.0} mm/s", machine::MOTOR_NAMES[motor], speed.0 * share);
-                return Err(PrinterError::new(ErrorCode::StepRateTooHigh, detail).at_line(mv.line.0));
+                return Err(PrinterError::new(ErrorCode::StepRateTooHigh, detail).at_line(line.0));
             }
         }
         Ok(())
@@ -425,6 +426,7 @@ impl Planner {
         if to == self.position {
             return Ok(());
         }
+        self.judge_speed(to, feed, line)?;
         if self.run == Run::None {
             self.look_ahead.begin_run();
             self.generator.begin_run(self.position).map_err(|error| wrong(&error).at_line(line.0))?;

@@ -1,6 +1,8 @@
 //! One stream of G-code with its own modal state: a job's file, or what a user types.
 
-use gcode::{Action, Arc, CHORD_TOLERANCE, Chords, Diagnostic, Interpreter, LineNumber, Lines, Move, Settings};
+use gcode::{
+    Action, Arc, CHORD_TOLERANCE, Chords, Diagnostic, Interpreter, LineNumber, Lines, Move, Settings,
+};
 
 /// The most bytes a source holds before it says that it wants no more.
 pub const SOURCE_BYTES_MAX: usize = 64 * 1024;

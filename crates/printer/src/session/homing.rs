@@ -263,7 +263,9 @@ impl AxisHoming {
     }
 
     fn watch(&mut self, board: &mut Board, now: Seconds) -> Result<Wish, PrinterError> {
-        let Stage::Approach { start, end, kept_alive, heard } = &mut self.stage else { return Ok(Wish::Wait) };
+        let Stage::Approach { start, end, kept_alive, heard } = &mut self.stage else {
+            return Ok(Wish::Wait);
+        };
         let clock_now = board.clock_at(now);
         if now - *kept_alive >= KEEP_ALIVE {
             *kept_alive = now;

@@ -35,7 +35,11 @@ use self::{
     inbox::Message,
     ready::{Failure, Ready},
 };
-use crate::{config::PrinterConfig, error::{Ended, ErrorCode, PrinterError}, link::LinkStats};
+use crate::{
+    config::PrinterConfig,
+    error::{Ended, ErrorCode, PrinterError},
+    link::LinkStats,
+};
 
 /// With nothing to do, the owner is asked to come back after this long.
 const IDLE_WAKE: Seconds = Seconds(1.0);

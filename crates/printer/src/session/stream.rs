@@ -90,9 +90,10 @@ impl MotionStream {
         let has_room = |motor| board.link.room(Lane::Motion(motor as u8)) >= LANE_ROOM_MIN;
         self.timeline.len() < TIMELINE_MAX
             && (0..MOTORS).all(has_room)
-            && self.run.zip(generated_until).is_none_or(|(run, until)| {
-                run.start + until < clock_now + board.ticks(HORIZON)
-            })
+            && self
+                .run
+                .zip(generated_until)
+                .is_none_or(|(run, until)| run.start + until < clock_now + board.ticks(HORIZON))
     }
 
     /// Whether the motion planned so far ends soon.

@@ -7,12 +7,7 @@ use gcode::Heater as HeaterName;
 use units::{Celsius, Seconds, Ticks};
 use wire::Command;
 
-use super::{
-    board::Board,
-    event::Event,
-    fan::Fan,
-    layout::HeaterOids,
-};
+use super::{board::Board, event::Event, fan::Fan, layout::HeaterOids};
 use crate::{
     config::{HeaterConfig, PrinterConfig},
     error::{ErrorCode, PrinterError},
@@ -178,7 +173,8 @@ impl Thermal {
         for channel in &self.channels {
             let heard = channel.last_report.unwrap_or(self.started).max(self.started);
             if now - heard > SILENCE_MAX {
-                let detail = format!("no reading of {} for {:.1} s", channel.heater.config().name, (now - heard).0);
+                let detail =
+                    format!("no reading of {} for {:.1} s", channel.heater.config().name, (now - heard).0);
                 return Err(PrinterError::new(ErrorCode::LinkTimeout, detail));
             }
         }

@@ -264,7 +264,7 @@ impl Bench {
     pub(crate) fn home(&mut self) {
         self.gcode("G28");
         let position = self.session.position();
-        assert!(position.is_some_and(|(_, homed)| homed == [true; 3]), "{:?}", self.errors());
+        assert!(position.is_some_and(|(_, homed)| homed == [true; 3]), "{:?}", self.remarkable());
     }
 
     pub(crate) fn start_with(&mut self, file: &str, options: JobOptions) -> Result<(), PrinterError> {

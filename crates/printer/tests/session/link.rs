@@ -48,9 +48,13 @@ fn a_damaged_line_changes_no_pulse() {
     let (expected, damaged, _) = print("", 1);
     assert_eq!(damaged, [0, 0]);
     assert!(expected.len() > 10_000);
-    for (seed, faults) in
-        [(1, "corrupt=0.01"), (2, "drop=0.01"), (3, "duplicate=0.01"), (4, "delay=0.01"), (5, "corrupt=0.005,drop=0.005,delay=0.002")]
-    {
+    for (seed, faults) in [
+        (1, "corrupt=0.01"),
+        (2, "drop=0.01"),
+        (3, "duplicate=0.01"),
+        (4, "delay=0.01"),
+        (5, "corrupt=0.005,drop=0.005,delay=0.002"),
+    ] {
         let (pulses, damaged, again) = print(faults, seed);
         assert!(damaged.iter().sum::<u64>() > 50, "{faults}: {damaged:?}");
         assert!(again > 0 || faults.starts_with("d"), "{faults}");

@@ -16,7 +16,8 @@ pub(crate) fn squares(count: usize) -> String {
     let mut file = String::from(START);
     for layer in 0..count {
         let z = 1.0 + 0.2 * layer as f64;
-        let square = "G1 X60 Y60 F9000\nG1 X90 E1 F2400\nG1 Y90 E1\nG1 X60 E1\nG1 Y60 E1\nG1 E-1 F1800\nG1 E1\n";
+        let square =
+            "G1 X60 Y60 F9000\nG1 X90 E1 F2400\nG1 Y90 E1\nG1 X60 E1\nG1 Y60 E1\nG1 E-1 F1800\nG1 E1\n";
         file += &format!("G1 Z{z:.1} F600\n{square}");
     }
     file + END
@@ -160,7 +161,8 @@ fn a_target_that_changes_on_the_way_takes_effect_on_the_way() {
 #[test]
 fn inches_offsets_and_relative_moves_end_where_they_should() {
     let mut bench = Setup::default().ready();
-    bench.print("G28\nG1 X10 Y100 F6000\nG92 X0 Y0\nG1 X5 Y5\nG91\nG1 X5 Y5\nG90\nG20\nG1 X1\nG21\nG1 Y-20\n");
+    bench
+        .print("G28\nG1 X10 Y100 F6000\nG92 X0 Y0\nG1 X5 Y5\nG91\nG1 X5 Y5\nG90\nG20\nG1 X1\nG21\nG1 Y-20\n");
     bench.job_done();
     bench.assert_position(10.0 + 25.4, 80.0, 0.5);
 }

@@ -93,7 +93,8 @@ impl Ready {
                 "the position was lost while the job was paused",
             ));
         }
-        if let (true, ExtrusionPermit::TooCold { celsius }) = (paused.could_extrude, self.extrusion_permit()) {
+        if let (true, ExtrusionPermit::TooCold { celsius }) = (paused.could_extrude, self.extrusion_permit())
+        {
             let detail = format!("the nozzle has cooled to {celsius:.0} °C while the job was paused");
             return Err(PrinterError::new(ErrorCode::ColdExtrusion, detail));
         }
