@@ -271,13 +271,15 @@ fn check_move(planned: &PlannedMove, limits: &Limits, feed: f64) {
 /// The highest speed at which `b` may follow `a`, from the angle between them: an independent way to the same limit.
 fn corner_limit(a: &PlannedMove, b: &PlannedMove, limits: &Limits) -> f64 {
     let dot: f64 = (0..3).map(|i| a.direction[i] * b.direction[i]).sum();
-    let turn = dot.clamp(-1.0, 1.0).acos();
+    let turn = libm::acos(dot.clamp(-1.0, 1.0));
     // Half the angle between the moves; π/2 where they go straight on.
     let half = 0.5 * (std::f64::consts::PI - turn);
-    let ratio = half.sin() / (1.0 - half.sin());
-    let deviation = limits.square_corner_velocity.0.powi(2) * (2.0_f64.sqrt() - 1.0) / limits.max_accel.0;
-    let of =
-        |m: &PlannedMove| (ratio * deviation * m.accel).min(0.5 * m.length * m.accel * half.tan()).sqrt();
+    let ratio = libm::sin(half) / (1.0 - libm::sin(half));
+    let corner = limits.square_corner_velocity.0;
+    let deviation = corner * corner * (2.0_f64.sqrt() - 1.0) / limits.max_accel.0;
+    let of = |m: &PlannedMove| {
+        (ratio * deviation * m.accel).min(0.5 * m.length * m.accel * libm::tan(half)).sqrt()
+    };
     let jump = (a.direction[3] - b.direction[3]).abs();
     of(a).min(of(b)).min(limits.extruder.instantaneous_corner_velocity.0 / jump)
 }
@@ -395,7 +397,7 @@ proptest! {
         for &(angle, count, length, feed) in &pieces {
             for index in 0..count {
                 let angle = angle + 1e-4 * index as f64;
-                at = [at[0] + length * angle.cos(), at[1] + length * angle.sin(), 0.0, at[3] + 0.04 * length];
+                at = [at[0] + length * libm::cos(angle), at[1] + length * libm::sin(angle), 0.0, at[3] + 0.04 * length];
                 points.push((at, feed));
             }
         }
