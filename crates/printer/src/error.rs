@@ -322,11 +322,10 @@ impl PrinterError {
     pub fn what_is_safe(&self) -> &'static str {
         let usual = self.code.what_is_safe();
         match self.ended {
-            Ended::Nothing => usual,
             Ended::Job => JOB_ENDED,
             // Where the code speaks of a stop or of a lost connection already, it knows more.
             Ended::Everything if [NOTHING_MOVED, REFUSED, AXIS_STOPPED].contains(&usual) => STOPPED_BY_HOST,
-            Ended::Everything => usual,
+            Ended::Everything | Ended::Nothing => usual,
         }
     }
 

@@ -406,3 +406,6 @@ impl AxisHoming {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

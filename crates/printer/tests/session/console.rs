@@ -43,6 +43,14 @@ fn a_homed_axis_that_is_homed_again_claims_nothing_meanwhile() {
 }
 
 #[test]
+fn an_axis_without_a_way_back_homes_once_and_again_where_it_stands() {
+    let mut bench = Setup::config("homing_speed: 40", "homing_retract_dist: 0\nhoming_speed: 40").ready();
+    bench.home();
+    bench.home();
+    bench.assert_position(0.0, 150.0, 0.5);
+}
+
+#[test]
 fn a_move_before_homing_is_refused_and_nothing_moves() {
     let mut bench = Setup::default().ready();
     bench.gcode("G91\nG1 X1 F600");

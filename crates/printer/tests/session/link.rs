@@ -1,5 +1,7 @@
 //! The line to the board: cut, damaged, silent, shared with another host, slow.
 
+use std::fmt::Write;
+
 use printer::{
     error::ErrorCode,
     session::{JobStatus, PhaseName, Request},
@@ -57,7 +59,7 @@ fn a_damaged_line_changes_no_pulse() {
     ] {
         let (pulses, damaged, again) = print(faults, seed);
         assert!(damaged.iter().sum::<u64>() > 50, "{faults}: {damaged:?}");
-        assert!(again > 0 || faults.starts_with("d"), "{faults}");
+        assert!(again > 0 || faults.starts_with('d'), "{faults}");
         assert!(pulses == expected, "{faults}: {} pulses, {} expected", pulses.len(), expected.len());
     }
 }
@@ -198,7 +200,7 @@ fn a_small_board_on_a_serial_line_prints_a_dense_file() {
     for n in 0..3000 {
         let angle = f64::from(n) * 0.05;
         let (x, y) = (75.0 + 20.0 * libm::cos(angle), 75.0 + 20.0 * libm::sin(angle));
-        file += &format!("G1 X{x:.3} Y{y:.3} E0.04 F6000\n");
+        writeln!(file, "G1 X{x:.3} Y{y:.3} E0.04 F6000").unwrap();
     }
     bench.print(&(file + END));
     bench.job_done();

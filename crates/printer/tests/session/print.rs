@@ -1,5 +1,7 @@
 //! Jobs that end as they should, and what happens on the way.
 
+use std::fmt::Write;
+
 use gcode::Heater;
 use printer::session::{Event, JobOptions, JobStatus, Request, ScheduledMove};
 use units::Celsius;
@@ -18,9 +20,14 @@ pub(crate) fn squares(count: usize) -> String {
         let z = 1.0 + 0.2 * layer as f64;
         let square =
             "G1 X60 Y60 F9000\nG1 X90 E1 F2400\nG1 Y90 E1\nG1 X60 E1\nG1 Y60 E1\nG1 E-1 F1800\nG1 E1\n";
-        file += &format!("G1 Z{z:.1} F600\n{square}");
+        write!(file, "G1 Z{z:.1} F600\n{square}").unwrap();
     }
     file + END
+}
+
+/// Many lines.
+fn lines(count: u32, line: impl Fn(u32) -> String) -> String {
+    (0..count).map(line).collect()
 }
 
 /// The moves as they were told, less those that home.
@@ -236,7 +243,7 @@ fn while_a_job_runs_other_orders_are_refused_and_heaters_can_be_set() {
 fn nobody_who_takes_events_is_no_harm() {
     let mut bench = Setup::default().ready();
     bench.home();
-    let comments: String = (0..40_000).map(|n| format!(";TYPE:Perimeter\n;Z:{n}\n")).collect();
+    let comments = lines(40_000, |n| format!(";TYPE:Perimeter\n;Z:{n}\n"));
     bench.print(&format!("G1 X10 F6000\n{comments}G1 X20\n"));
     bench.job_done();
 }
@@ -245,7 +252,7 @@ fn nobody_who_takes_events_is_no_harm() {
 fn a_file_full_of_fan_orders_neither_floods_the_board_nor_hangs() {
     let mut bench = Setup::default().ready();
     bench.home();
-    let orders: String = (0..5000).map(|n| format!("M106 S{}\n", n % 256)).collect();
+    let orders = lines(5000, |n| format!("M106 S{}\n", n % 256));
     bench.print(&format!("M104 S50\n{orders}G1 X10 F6000\n{orders}M106 S255\nG1 X20\nM104 S0\n"));
     bench.job_done();
     bench.run(1.0);

@@ -1,5 +1,7 @@
 //! Pause, resume, cancel, emergency stop.
 
+use std::fmt::Write;
+
 use gcode::Heater;
 use printer::{
     error::ErrorCode,
@@ -153,7 +155,7 @@ fn a_cancelled_job_ends_with_everything_off() {
     // Between the orders in the file and their time there are seconds: none may come true afterwards.
     let mut file = String::from(START);
     for n in 0..40 {
-        file += &format!("G1 X60 E1 F1200\nM104 S{}\nM106 S255\nG1 X10 E1\n", 70 + n % 2);
+        write!(file, "G1 X60 E1 F1200\nM104 S{}\nM106 S255\nG1 X10 E1\n", 70 + n % 2).unwrap();
     }
     let mut bench = Setup::default().ready();
     bench.start(&file);
