@@ -50,7 +50,9 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
     /// Takes bytes from the host, in pieces of any size: answers and obeys.
     pub fn receive(&mut self, board: &mut impl Board, bytes: &[u8]) {
         let Self { deframer, core } = self;
-        core.uptime.look(board.now());
+        let now = board.now();
+        core.uptime.look(now);
+        core.timers.look(now);
         deframer.push(bytes, |frame| core.frame(board, frame));
     }
 
@@ -155,6 +157,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     fn run_timers(&mut self, board: &mut impl Board) -> Clock32 {
         let begin = board.now();
         let mut now = begin;
+        self.timers.look(now);
         if !now.is_before(self.look_at) || self.stats.is_new() {
             self.look(now);
         }
