@@ -165,7 +165,8 @@ impl Builder<'_> {
         let (endstop, trsync) = (self.oid(), self.oid());
         let pull_up = match pin.pull {
             Pull::Up => 1,
-            Pull::None | Pull::Down => 0,
+            Pull::None => 0,
+            Pull::Down => -1,
         };
         self.commands.push(Command::ConfigEndstop { oid: endstop.0, pin: number, pull_up });
         self.commands.push(Command::ConfigTrsync { oid: trsync.0 });

@@ -135,6 +135,7 @@ fn setting_a_target_counts_as_use() {
         bench.ask(Request::SetTemperature(gcode::Heater::Bed, units::Celsius(40.0)));
     }
     assert!(bench.celsius(1) > 30.0);
+    assert!(!bench.events.iter().any(|event| matches!(event, Event::Message(_))));
 }
 
 #[test]

@@ -160,9 +160,12 @@ fn a_cancelled_job_ends_with_everything_off() {
     let mut bench = Setup::default().ready();
     bench.start(&file);
     bench.line(16);
+    bench.events.clear();
     bench.ask(Request::Cancel);
     bench.job_over();
     assert!(bench.events.contains(&Event::JobCancelled));
+    let heats = |event: &Event| matches!(event, Event::Temperature { target, .. } if target.0 > 0.0);
+    assert!(!bench.events.iter().any(heats), "an order of the cancelled job came true");
     assert_eq!(bench.errors(), []);
     bench.run(5.0);
     bench.assert_all_off();
