@@ -190,7 +190,7 @@ fn simplify3d_layer(text: &[u8], push: &mut impl FnMut(Annotation)) {
     push(Annotation::LayerChange);
     push(Annotation::Layer(layer as i32));
     if let Some(rest) = text[end..].strip_prefix(b", Z = ")
-        && let Some((z, _)) = number::read(rest, 0)
+        && let Some((z, _)) = number::read(rest, 0).filter(|(z, _)| *z <= 1e9)
     {
         push(Annotation::Z(Mm(z)));
     }
@@ -198,10 +198,10 @@ fn simplify3d_layer(text: &[u8], push: &mut impl FnMut(Annotation)) {
 
 /// `0.200 W0.480`
 fn simplify3d_tool(text: &[u8], push: &mut impl FnMut(Annotation)) {
-    let Some((height, end)) = number::read(text, 0) else { return };
+    let Some((height, end)) = number::read(text, 0).filter(|(height, _)| *height <= 1e9) else { return };
     push(Annotation::Height(Mm(height)));
     if let Some(rest) = text[end..].strip_prefix(b" W")
-        && let Some((width, _)) = number::read(rest, 0)
+        && let Some((width, _)) = number::read(rest, 0).filter(|(width, _)| *width <= 1e9)
     {
         push(Annotation::Width(Mm(width)));
     }
@@ -276,6 +276,11 @@ mod tests {
             [LayerChange, Layer(1), Z(Mm(0.2)), F(Feature::Skirt), Height(Mm(0.2)), Width(Mm(0.48))]
         );
         assert_eq!(annotations(&["TYPE:Something new"]), [F(Feature::Other)]);
+        let absurd = "9".repeat(400);
+        assert_eq!(
+            annotations(&[&format!(" tool H{absurd}"), &format!(" layer 1, Z = {absurd}")]),
+            [LayerChange, Layer(1)]
+        );
     }
 
     #[test]

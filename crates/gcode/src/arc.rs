@@ -23,6 +23,8 @@ const RADIUS_SLACK_MM: f64 = 0.05;
 const RADIUS_SLACK_RATIO: f64 = 0.005;
 /// … and by ten times either, are no arc.
 const RADIUS_ERROR_FACTOR: f64 = 10.0;
+/// Ends nearer to each other than this are one point: the dust of adding up relative moves, far below a step.
+const SAME_POINT_MM: f64 = 1e-9;
 /// A chord turns by at most this much, however loose the tolerance.
 const CHORD_ANGLE_MAX: f64 = PI / 4.0;
 
@@ -134,7 +136,7 @@ impl Arc {
             return Err(ArcError::RadiiDiffer(r0, r1));
         }
         let mut angle = angle_of(end, centre) - angle_of(start, centre);
-        if start == end {
+        if distance(start, end) < SAME_POINT_MM {
             angle = 0.0;
         }
         // Into (0, 2π] in the direction of turning: the same point means a full circle.
@@ -249,7 +251,7 @@ fn centre_from_radius(
 ) -> Result<[f64; 2], ArcError> {
     let half = [(end[0] - start[0]) / 2.0, (end[1] - start[1]) / 2.0];
     let half_chord = libm::hypot(half[0], half[1]);
-    if half_chord < 1e-9 {
+    if half_chord < SAME_POINT_MM {
         return Err(ArcError::FullCircleByRadius);
     }
     if radius.abs() > RADIUS_MAX_MM {

@@ -60,6 +60,8 @@ codes! {
     NotText = "not-text",
     /// Something that is not a letter with a number.
     MalformedWord = "malformed-word",
+    /// A line holds more than one command.
+    SeveralCommands = "several-commands",
     /// `X1E5`: an exponent, or a word for the extruder?
     AmbiguousExponent = "ambiguous-exponent",
     /// A letter occurs twice in one line.

@@ -47,6 +47,8 @@ pub(crate) enum WordFault {
     Duplicate(u8, Range<usize>),
     /// `X1E5` in a line whose words are apart otherwise.
     Exponent(Range<usize>),
+    /// A `G` or `M` among the words of a command: a second one.
+    SecondCommand(Range<usize>),
     /// More than [`VALUE_MAX`].
     TooLarge(Range<usize>),
 }
@@ -69,9 +71,19 @@ impl Default for Words {
 }
 
 impl Words {
-    /// Reads the words from `at` to the end of the line.
+    /// Reads the words from `at`, behind a command, to the end of the line.
     #[inline]
-    pub(crate) fn scan(&mut self, bytes: &[u8], mut at: usize) -> Result<WordsEnd, WordFault> {
+    pub(crate) fn scan(&mut self, bytes: &[u8], at: usize) -> Result<WordsEnd, WordFault> {
+        let end = self.scan_any(bytes, at)?;
+        match self.first_of(bits(b"GM")) {
+            Some(letter) => Err(WordFault::SecondCommand(self.columns(letter))),
+            None => Ok(end),
+        }
+    }
+
+    /// Reads the words from `at` to the end of the line, commands or not.
+    #[inline]
+    pub(crate) fn scan_any(&mut self, bytes: &[u8], mut at: usize) -> Result<WordsEnd, WordFault> {
         self.present = 0;
         self.bare = 0;
         let first = at;
@@ -170,8 +182,14 @@ impl Words {
     }
 
     /// The leftmost letter of a mask that occurs.
+    #[inline]
     pub(crate) fn first_of(&self, mask: u32) -> Option<u8> {
         let found = self.present & mask;
+        if found == 0 { None } else { self.leftmost(found) }
+    }
+
+    #[cold]
+    fn leftmost(&self, found: u32) -> Option<u8> {
         let letters = (b'A'..=b'Z').filter(|&letter| found & bit(letter) != 0);
         letters.min_by_key(|&letter| self.columns[usize::from(letter - b'A')])
     }
@@ -224,6 +242,7 @@ mod tests {
         assert_eq!(scan("X1.2.3").unwrap_err(), WordFault::NoLetter(4..6));
         assert_eq!(scan("X1 =2").unwrap_err(), WordFault::NoLetter(3..5));
         assert_eq!(scan("X1 \u{7f}").unwrap_err(), WordFault::NotText(3..4));
+        assert_eq!(scan("X1 G91").unwrap_err(), WordFault::SecondCommand(3..4));
         assert_eq!(scan("X1 (open").unwrap().1.unclosed, Some(3));
     }
 }

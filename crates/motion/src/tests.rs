@@ -271,13 +271,15 @@ fn check_move(planned: &PlannedMove, limits: &Limits, feed: f64) {
 /// The highest speed at which `b` may follow `a`, from the angle between them: an independent way to the same limit.
 fn corner_limit(a: &PlannedMove, b: &PlannedMove, limits: &Limits) -> f64 {
     let dot: f64 = (0..3).map(|i| a.direction[i] * b.direction[i]).sum();
-    let turn = dot.clamp(-1.0, 1.0).acos();
+    let turn = libm::acos(dot.clamp(-1.0, 1.0));
     // Half the angle between the moves; π/2 where they go straight on.
     let half = 0.5 * (std::f64::consts::PI - turn);
-    let ratio = half.sin() / (1.0 - half.sin());
-    let deviation = limits.square_corner_velocity.0.powi(2) * (2.0_f64.sqrt() - 1.0) / limits.max_accel.0;
-    let of =
-        |m: &PlannedMove| (ratio * deviation * m.accel).min(0.5 * m.length * m.accel * half.tan()).sqrt();
+    let ratio = libm::sin(half) / (1.0 - libm::sin(half));
+    let corner = limits.square_corner_velocity.0;
+    let deviation = corner * corner * (2.0_f64.sqrt() - 1.0) / limits.max_accel.0;
+    let of = |m: &PlannedMove| {
+        (ratio * deviation * m.accel).min(0.5 * m.length * m.accel * libm::tan(half)).sqrt()
+    };
     let jump = (a.direction[3] - b.direction[3]).abs();
     of(a).min(of(b)).min(limits.extruder.instantaneous_corner_velocity.0 / jump)
 }
@@ -356,5 +358,66 @@ proptest! {
         while let Some(planned) = look_ahead.pop() {
             prop_assert!(planned.end_time().is_finite());
         }
+    }
+
+    #[test]
+    fn a_change_of_limits_on_the_way_holds_from_its_move_on(
+        points in any_points(),
+        limits in proptest::collection::vec(any_limits(), 1..6),
+        every in 1_usize..20,
+    ) {
+        let of = |index: usize| limits[index / every % limits.len()];
+        let mut look_ahead = LookAhead::new(limits[0]).unwrap();
+        for (index, request) in requests(&points).iter().enumerate() {
+            look_ahead.set_limits(of(index)).unwrap();
+            look_ahead.push(request).unwrap();
+        }
+        look_ahead.flush();
+        let planned: Vec<_> = std::iter::from_fn(|| look_ahead.pop()).collect();
+        for one in &planned {
+            check_move(one, &of(one.tag as usize), points[one.tag as usize].1);
+        }
+        for pair in planned.windows(2) {
+            prop_assert_eq!(pair[0].end_velocity, pair[1].start_velocity);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn thousands_of_short_pieces_fill_the_window_and_keep_the_limits(
+        pieces in proptest::collection::vec((0.0..std::f64::consts::TAU, 50_usize..3000, 1e-4..0.02_f64, 1.0..500.0_f64), 1..6),
+        limits in proptest::collection::vec(any_limits(), 1..4),
+    ) {
+        // Straight stretches and curls of tiny pieces: the window is released by force while speeds are high.
+        let mut points = Vec::new();
+        let mut at = [0.0; 4];
+        for &(angle, count, length, feed) in &pieces {
+            for index in 0..count {
+                let angle = angle + 1e-4 * index as f64;
+                at = [at[0] + length * libm::cos(angle), at[1] + length * libm::sin(angle), 0.0, at[3] + 0.04 * length];
+                points.push((at, feed));
+            }
+        }
+        let of = |index: usize| limits[index / 700 % limits.len()];
+        let mut look_ahead = LookAhead::new(limits[0]).unwrap();
+        let mut planned = Vec::new();
+        for (index, request) in requests(&points).iter().enumerate() {
+            look_ahead.set_limits(of(index)).unwrap();
+            look_ahead.push(request).unwrap();
+            planned.extend(std::iter::from_fn(|| look_ahead.pop()));
+        }
+        look_ahead.flush();
+        planned.extend(std::iter::from_fn(|| look_ahead.pop()));
+        prop_assert_eq!(planned.len(), points.len());
+        for one in &planned {
+            check_move(one, &of(one.tag as usize), points[one.tag as usize].1);
+        }
+        for pair in planned.windows(2) {
+            prop_assert_eq!(pair[0].end_velocity, pair[1].start_velocity);
+        }
+        prop_assert_eq!(planned[planned.len() - 1].end_velocity, 0.0);
     }
 }

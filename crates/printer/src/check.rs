@@ -10,7 +10,7 @@ use gcode::{
 use units::Celsius;
 
 use crate::{
-    config::PrinterConfig,
+    config::{HeaterConfig, PrinterConfig},
     error::{ErrorCode, PrinterError},
     machine,
     planner::{ExtrusionPermit, Guard},
@@ -152,6 +152,12 @@ impl Checker {
     }
 
     fn keep(&mut self, error: PrinterError) {
+        // The chords of one arc are wrong together.
+        let is_same =
+            |last: &PrinterError| last.line.is_some() && (last.line, last.code) == (error.line, error.code);
+        if self.report.errors.last().is_some_and(is_same) {
+            return;
+        }
         if self.report.errors.len() < FINDINGS_MAX {
             self.report.errors.push(error);
         } else {
@@ -173,6 +179,7 @@ impl Checker {
             Action::Arc(ref arc) => arc.chords(CHORD_TOLERANCE).for_each(|chord| self.judge(&chord)),
             Action::Home { x, y, z } => self.home([x, y, z]),
             Action::SetTemperature { heater, target, .. } => self.target(heater, target, line),
+            Action::WaitForTemperature { heater, .. } => _ = self.limits_of(heater, line),
             Action::TurnOffHeaters => self.nozzle = Celsius::ZERO,
             Action::MotorsOff { x, y, z, .. } => {
                 if let Some(guard) = &mut self.guard {
@@ -221,24 +228,31 @@ impl Checker {
         self.interpreter.set_axes(at[0], at[1], at[2]);
     }
 
-    fn target(&mut self, heater: Heater, target: Celsius, line: LineNumber) {
-        if heater == Heater::Tool(0) {
-            self.nozzle = target;
-        }
-        let Some(config) = &self.config else { return };
+    /// The machine file's heater; one that it does not have is an error.
+    fn limits_of(&mut self, heater: Heater, line: LineNumber) -> Option<HeaterConfig> {
+        let config = self.config.as_ref()?;
         let limits = match heater {
             Heater::Tool(0) => config.extruder.as_ref().map(|extruder| &extruder.heater),
             Heater::Bed => config.heater_bed.as_ref(),
             _ => None,
         };
-        let Some(limits) = limits else {
-            // Switching off what is not there is what many files end with.
-            if target > Celsius::ZERO {
-                let detail = format!("{heater:?} is not in the machine file");
-                self.error(ErrorCode::NoSuchHeater, detail, Some(line.0));
-            }
+        let limits = limits.cloned();
+        if limits.is_none() {
+            let detail = format!("{} is not in the machine file", machine::heater_name(heater));
+            self.error(ErrorCode::NoSuchHeater, detail, Some(line.0));
+        }
+        limits
+    }
+
+    fn target(&mut self, heater: Heater, target: Celsius, line: LineNumber) {
+        if heater == Heater::Tool(0) {
+            self.nozzle = target;
+        }
+        // Switching off what is not there is what many files end with.
+        if target == Celsius::ZERO && heater != Heater::Tool(0) {
             return;
-        };
+        }
+        let Some(limits) = self.limits_of(heater, line) else { return };
         let (min_extrude, max) = (limits.min_extrude_temp, limits.max_temp);
         if target > max {
             let detail = format!("{}: {target} was asked for, {max} is the most", limits.name);
@@ -253,5 +267,90 @@ impl Checker {
                 ExtrusionPermit::TooCold { celsius: target.0 }
             };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn machine_file() -> PrinterConfig {
+        crate::config::parse(include_str!("../../../samples/printer.cfg")).0.expect("the sample machine")
+    }
+
+    fn check(text: &str) -> CheckReport {
+        let mut checker = Checker::new(Some(&machine_file()));
+        // In pieces, as files come.
+        text.as_bytes().chunks(7).for_each(|piece| checker.feed(piece));
+        checker.finish()
+    }
+
+    fn errors(text: &str) -> Vec<(ErrorCode, Option<u32>)> {
+        check(text).errors.iter().map(|error| (error.code, error.line)).collect()
+    }
+
+    const WARM: &str = "G28\nM109 S200\nM83\n";
+
+    #[test]
+    fn a_sound_file_has_bounds_and_filament() {
+        let report = check(&format!("{WARM}G1 X10 Y20 Z0.3 F6000\nG1 X30 Y25 E2\nG1 X200 Y200\nM104 S0\n"));
+        assert!(report.is_printable() && report.blocking.is_empty());
+        assert_eq!((report.lines, report.moves, report.filament_mm), (7, 3, 2.0));
+        assert_eq!(report.bounds_mm, Some([[10.0, 20.0, 0.3], [30.0, 25.0, 0.3]]));
+    }
+
+    #[test]
+    fn each_fault_is_found_at_its_line() {
+        use ErrorCode as C;
+        for (text, expected) in [
+            ("G1 X5\n", (C::NotHomed, Some(1))),
+            ("G28\nG1 X301\n", (C::MoveOutOfRange, Some(2))),
+            ("G28\nG1 X5\nM84\nG1 X6\n", (C::NotHomed, Some(4))),
+            ("G28\nM83\nG1 X5 E1\n", (C::ColdExtrusion, Some(3))),
+            ("G28\nM104 S169\nM83\nG1 X5 E1\nM104 S0\n", (C::ColdExtrusion, Some(4))),
+            ("G28\nG1 X5\nM104 S261\nM104 S0\n", (C::TargetOutOfRange, Some(3))),
+            ("G28\nG1 X5\nM141 S40\n", (C::NoSuchHeater, Some(3))),
+            ("G28\nT1\nG1 X5\n", (C::NoSuchHeater, Some(2))),
+            ("G28\nG1 X1.2.3\nG1 X5\n", (C::InvalidGcode, Some(2))),
+            (
+                "G28\nM104 S200\nTEMPERATURE_WAIT SENSOR=extruder1 MINIMUM=40\nG1 X5\nM104 S0\n",
+                (C::NoSuchHeater, Some(3)),
+            ),
+            ("", (C::FileEmpty, None)),
+        ] {
+            assert_eq!(errors(text), [expected], "{text}");
+        }
+    }
+
+    #[test]
+    fn arcs_are_judged_by_their_chords() {
+        assert_eq!(errors("G28\nG1 X270 Y150\nG2 X270 Y150 I10\n"), []);
+        let found = errors("G28\nG1 X270 Y150\nG2 X270 Y150 I40\n");
+        assert_eq!(found, [(ErrorCode::MoveOutOfRange, Some(3))]);
+    }
+
+    #[test]
+    fn what_is_not_there_may_be_switched_off() {
+        assert_eq!(errors("G28\nG1 X5\nM141 S0\nM104 T1 S0\n"), []);
+    }
+
+    #[test]
+    fn unknown_commands_and_a_hot_end_block() {
+        let report = check(&format!("{WARM}PRIME_NOZZLE\nG1 X10 E1\n"));
+        let lines: Vec<u32> = report.blocking.iter().map(|blocking| blocking.line).collect();
+        assert_eq!(lines, [4, 5]);
+        assert!(report.blocking[1].message.contains("cut off"));
+    }
+
+    #[test]
+    fn a_million_faults_take_the_room_of_a_thousand() {
+        let mut checker = Checker::new(Some(&machine_file()));
+        for _ in 0..1000 {
+            checker.feed(&b"G1 X9999\nFOO\nG1 Xx\n".repeat(5));
+        }
+        let report = checker.finish();
+        assert_eq!(report.errors.len(), FINDINGS_MAX);
+        assert!(report.blocking.len() <= FINDINGS_MAX && report.diagnostics.len() <= FINDINGS_MAX);
+        assert!(report.dropped > 10_000);
     }
 }

@@ -56,6 +56,12 @@ const NOTHING_MOVED: &str = "Nothing was sent to the printer: it did not move an
 /// One command refused in a running session.
 const REFUSED: &str =
     "The command was not carried out. The printer waits where it was, its heaters as they were.";
+/// An axis could not be homed.
+const AXIS_STOPPED: &str =
+    "The axis stands still, and its position is not known until it is homed. Heaters stay as they were.";
+/// A job that ran has come to its end.
+const JOB_ENDED: &str = "The print has ended: the moves before that place were made, the motors stand still, the heaters \
+                         and the fan are off.";
 /// Contact is gone, so nothing can be claimed but what the board does by itself.
 const ON_ITS_OWN: &str = "The printer is on its own: its board switches the heaters off within 3 seconds without \
                           orders and stops when its queue of moves is empty. It may have lost its position.";
@@ -95,17 +101,20 @@ catalogue! {
         "A move was asked for before the machine was homed", REFUSED,
         "Home first (G28); a file from a slicer needs G28 in its start G-code.";
     EndstopNotReached, "endstop-not-reached":
-        "The endstop did not trigger over the whole homing travel", STOPPED_BY_HOST,
+        "The endstop did not trigger over the whole homing travel", AXIS_STOPPED,
         "Check that the axis moves and moves towards its endstop, that the switch clicks and is plugged in, and that endstop_pin is right.";
     EndstopStillTriggered, "endstop-still-triggered":
-        "The endstop is still triggered after moving away from it", STOPPED_BY_HOST,
+        "The endstop is still triggered after moving away from it", AXIS_STOPPED,
         "Check the switch and its cable, whether endstop_pin needs a `!` or a `^`, and that the motor moves away from the switch.";
     EndstopBeforeMove, "endstop-before-move":
-        "The endstop triggered before the axis had moved at all", STOPPED_BY_HOST,
+        "The endstop triggered before the axis had moved at all", AXIS_STOPPED,
         "Check whether endstop_pin needs a `!`, and that the switch is not held down by something.";
     HomingTimeout, "homing-timeout":
-        "The connection was too slow to watch the endstop, so the board stopped the homing move", STOPPED_BY_HOST,
+        "The connection was too slow to watch the endstop, so the board stopped the homing move", AXIS_STOPPED,
         "Connect the printer directly, without a hub, close other heavy programs, and home again.";
+    StepRateTooHigh, "step-rate-too-high":
+        "A move is so fast that a motor would have to step more often than any driver can", REFUSED,
+        "Lower max_velocity or max_extrude_only_velocity in printer.cfg, or use fewer microsteps or a larger rotation_distance.";
     UnknownCommand, "unknown-command":
         "The file has a command or macro that this program does not know", NOTHING_MOVED,
         "Check what the line should do. If the print is right without it, confirm that line; otherwise put plain G-code in its place in the slicer's start or end G-code.";
@@ -172,7 +181,7 @@ catalogue! {
         "The board ran out of room for moves", ALL_STOPPED,
         "This is a fault of this program or of the firmware: please report it with the session's log.";
     EmergencyStop, "emergency-stop":
-        "The emergency stop was pressed", ALL_STOPPED,
+        "The emergency stop was asked for", ALL_STOPPED,
         "When the reason is dealt with, restart the board and home.";
     BoardTooSlow, "board-too-slow":
         "The board could not keep up with its moves", ALL_STOPPED,
@@ -198,6 +207,9 @@ catalogue! {
     BusyPrinting, "busy-printing":
         "That cannot be done while a print is running", REFUSED,
         "Pause or cancel the print first.";
+    NoJob, "no-job":
+        "There is no print that this could be done to", REFUSED,
+        "Start a print first; one that has ended or was cancelled cannot be resumed.";
     NotConnected, "not-connected":
         "No printer is connected and ready", NOTHING_MOVED,
         "Connect the printer and wait until it is ready.";
@@ -250,18 +262,41 @@ pub struct PrinterError {
     pub detail: String,
     /// The line of the G-code that led to it, if one did.
     pub line: Option<u32>,
+    /// What it brought to an end, where that is not the same for every error of this code.
+    #[serde(default)]
+    pub ended: Ended,
+}
+
+/// What an error brought to an end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ended {
+    /// Nothing but what its code says.
+    #[default]
+    Nothing,
+    /// A job that ran: it came to rest, and heaters and fan went off.
+    Job,
+    /// Everything: the board was told to stop.
+    Everything,
 }
 
 impl PrinterError {
     /// An error with its particulars.
     pub fn new(code: ErrorCode, detail: impl Into<String>) -> Self {
-        Self { code, detail: detail.into(), line: None }
+        Self { code, detail: detail.into(), line: None, ended: Ended::Nothing }
     }
 
     /// The same, with the line of the G-code that led to it.
     #[must_use]
     pub fn at_line(mut self, line: u32) -> Self {
         self.line = Some(line);
+        self
+    }
+
+    /// The same, with what it brought to an end.
+    #[must_use]
+    pub fn ending(mut self, ended: Ended) -> Self {
+        self.ended = ended;
         self
     }
 
@@ -284,8 +319,14 @@ impl PrinterError {
     }
 
     /// What the machine does now and what is not in danger.
-    pub const fn what_is_safe(&self) -> &'static str {
-        self.code.what_is_safe()
+    pub fn what_is_safe(&self) -> &'static str {
+        let usual = self.code.what_is_safe();
+        match self.ended {
+            Ended::Job => JOB_ENDED,
+            // Where the code speaks of a stop or of a lost connection already, it knows more.
+            Ended::Everything if [NOTHING_MOVED, REFUSED, AXIS_STOPPED].contains(&usual) => STOPPED_BY_HOST,
+            Ended::Everything | Ended::Nothing => usual,
+        }
     }
 
     /// What the user should do.
@@ -349,5 +390,14 @@ mod tests {
         assert_eq!(error.to_string(), "Line 12: A move was asked for before the machine was homed: axis X.");
         let error = PrinterError::from(ErrorCode::NotHomed);
         assert_eq!(error.to_string(), "A move was asked for before the machine was homed.");
+    }
+
+    #[test]
+    fn what_is_safe_depends_on_what_has_ended() {
+        let safe = |code, ended| PrinterError::from(code).ending(ended).what_is_safe();
+        assert_eq!(safe(ErrorCode::InvalidGcode, Ended::Nothing), NOTHING_MOVED);
+        assert_eq!(safe(ErrorCode::InvalidGcode, Ended::Job), JOB_ENDED);
+        assert_eq!(safe(ErrorCode::StepRateTooHigh, Ended::Everything), STOPPED_BY_HOST);
+        assert_eq!(safe(ErrorCode::LinkTimeout, Ended::Everything), ON_ITS_OWN);
     }
 }

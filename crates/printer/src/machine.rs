@@ -18,6 +18,16 @@ pub const MOTORS: usize = 4;
 /// The motors' names, as in the machine file.
 pub const MOTOR_NAMES: [&str; MOTORS] = ["stepper_x", "stepper_y", "stepper_z", "extruder"];
 
+/// What a machine file calls a heater.
+pub fn heater_name(heater: gcode::Heater) -> String {
+    match heater {
+        gcode::Heater::Tool(0) => "extruder".to_owned(),
+        gcode::Heater::Tool(tool) => format!("extruder{tool}"),
+        gcode::Heater::Bed => "heater_bed".to_owned(),
+        gcode::Heater::Chamber => "the chamber heater".to_owned(),
+    }
+}
+
 /// The index of the extruder's motor.
 pub const EXTRUDER: usize = 3;
 
@@ -32,6 +42,20 @@ pub fn step_distances(config: &PrinterConfig) -> [Mm; MOTORS] {
     let [x, y, z] = config.steppers.each_ref().map(|axis| axis.motor.step_distance());
     let e = config.extruder.as_ref().map_or(NO_EXTRUDER_STEP_MM, |extruder| extruder.motor.step_distance());
     [x, y, z, e]
+}
+
+/// The speed of each motor's axis at which it makes as many steps as can be told apart: pulses and the gaps between
+/// them last for `step_pulse_duration` at least.
+pub fn motor_speeds_max(config: &PrinterConfig, clock: Hertz) -> [MmPerS; MOTORS] {
+    let [x, y, z] = config.steppers.each_ref().map(|axis| axis.motor.step_pulse_duration);
+    let e = config.extruder.as_ref().map_or(Seconds::ZERO, |extruder| extruder.motor.step_pulse_duration);
+    let pulses = [x, y, z, e];
+    let distances = step_distances(config);
+    core::array::from_fn(|motor| {
+        let pulse_ticks = clock.ticks_in(pulses[motor]).0.max(1) as f64;
+        let rate = steps::step_rate_max(clock).min(f64::from(clock.0) / (2.0 * pulse_ticks));
+        MmPerS(distances[motor].0 * rate)
+    })
 }
 
 /// The planner's limits.

@@ -194,7 +194,7 @@ fn every_fault_ends_with_its_own_error_and_a_safe_machine() {
         ("heater-dead=extruder", "heater-not-heating"),
         ("endstop-stuck-on=x", "endstop-still-triggered"),
         ("endstop-stuck-off=y", "endstop-not-reached"),
-        ("unplug@20", "link-timeout"),
+        ("unplug@20", "link-lost"),
         ("drop=1", "board-silent"),
     ] {
         let (output, report) = simulate(&file, &["--fault", fault]);

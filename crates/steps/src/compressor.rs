@@ -5,7 +5,8 @@
 //! window lies around the true time: errors never add up.
 //!
 //! Whether a command is closed depends on the step times alone, never on when they become known: a later step either
-//! closes it by its distance or could have gone on with it.
+//! closes it by its distance or could have gone on with it. Only where another motor's pieces run out of room is one
+//! closed early, after a number of moves that is always the same.
 
 use crate::stabbing::{FIT_STEPS_MAX, Stabbing, larger, smaller};
 use crate::{IDLE_TICKS_MAX, StepCommand, StepCommandKind};
@@ -186,6 +187,18 @@ impl Compressor {
         }
     }
 
+    /// Gives out what could still have gone on: others wait for it, and their room is used up. What follows the last
+    /// step comes no earlier than `next`.
+    pub(crate) fn close_early(&mut self, next: f64) {
+        if self.times.len() <= 1 {
+            return self.emit_all(next);
+        }
+        self.take_all_but(1, next);
+        if self.out.is_empty() {
+            self.emit();
+        }
+    }
+
     /// No more steps in this run, or none for a long time.
     pub(crate) fn end(&mut self) {
         self.emit_all(f64::INFINITY);
@@ -194,7 +207,12 @@ impl Compressor {
     /// Fits the last step in, now that its neighbour at `next` is known, and any that a closed command left.
     #[inline(never)]
     fn take_last(&mut self, next: f64) {
-        while (self.stabbing.count() as usize) < self.times.len() {
+        self.take_all_but(0, next);
+    }
+
+    /// Fits in all steps but the last `open` ones; whatever follows the last of all comes at `next`.
+    fn take_all_but(&mut self, open: usize, next: f64) {
+        while (self.stabbing.count() as usize) + open < self.times.len() {
             let index = self.stabbing.count() as usize;
             let (earliest, latest) = self.window(index, next);
             if index == 0 && latest > IDLE_TICKS_MAX as f64 {

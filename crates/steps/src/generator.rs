@@ -204,7 +204,7 @@ impl<K: Kinematics> StepGenerator<K> {
         if self.ended {
             return Err(PushError::Ended);
         }
-        if self.motors.iter().any(|motor| motor.pieces.len() >= PIECES_MAX) {
+        if self.is_full() {
             return Err(PushError::Full);
         }
         let end_time = planned.end_time();
@@ -227,6 +227,10 @@ impl<K: Kinematics> StepGenerator<K> {
         }
         self.pushed = self.pushed.max(end_time * f64::from(self.clock.0));
         Ok(())
+    }
+
+    fn is_full(&self) -> bool {
+        self.motors.iter().any(|motor| motor.pieces.len() >= PIECES_MAX)
     }
 
     /// Works out one motor's share of a move.
@@ -274,13 +278,21 @@ impl<K: Kinematics> StepGenerator<K> {
     /// or the run is ended.
     pub fn pop(&mut self) -> Option<StepCommand> {
         loop {
+            let is_full = self.is_full();
             let order = |a: &&mut Motor, b: &&mut Motor| a.earliest().total_cmp(&b.earliest());
             let first = self.motors.iter_mut().min_by(order)?;
             if first.compressor.is_ready() {
                 return first.compressor.pop();
             }
             if !first.advance(self.pushed, self.ended) {
-                return None;
+                if !is_full {
+                    return None;
+                }
+                // Its open command holds up a motor whose pieces have no room left.
+                first.compressor.close_early(self.pushed);
+                if !first.compressor.is_ready() {
+                    return None;
+                }
             }
         }
     }

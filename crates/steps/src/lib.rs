@@ -24,7 +24,7 @@ pub use compressor::{RUN_SPAN_MAX, STEP_HOLD_MAX, STEPS_BUFFERED_MAX};
 pub use generator::{MotorStats, PIECES_MAX, PushError, SpecError, StepGenerator, StepperSpec};
 pub use kinematics::{Cartesian, Kinematics, MotorSegment};
 
-use units::Ticks;
+use units::{Hertz, Ticks};
 
 /// What one motor is told to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +64,12 @@ pub enum StepCommandKind {
 
 /// The longest interval that a board may be sent ahead of time, in ticks.
 pub const IDLE_TICKS_MAX: u64 = 3 << 28;
+
+/// The most steps a second that a motor may be asked for, for a board with this clock.
+pub fn step_rate_max(clock: Hertz) -> f64 {
+    let ticks_per_s = f64::from(clock.0);
+    ticks_per_s / compressor::gap_min_ticks(ticks_per_s)
+}
 
 #[cfg(test)]
 mod tests;

@@ -100,6 +100,7 @@ fn nearest(position: f64, motor: usize) -> f64 {
 /// The exact time (in ticks) and direction of each crossing, by bisection over the planned moves.
 fn crossings(planned: &[PlannedMove], motor: usize, clock: Hertz) -> Vec<(f64, bool)> {
     let distance = STEP_DISTANCES[motor];
+    let back_within = crate::compressor::gap_min_ticks(f64::from(clock.0));
     let mut count = nearest(planned[0].from[motor], motor);
     let mut out: Vec<(f64, bool)> = Vec::new();
     for one in planned {
@@ -115,7 +116,8 @@ fn crossings(planned: &[PlannedMove], motor: usize, clock: Hertz) -> Vec<(f64, b
                 if (at - edge) * sign < 0.0 { low = middle } else { high = middle }
             }
             let time = (one.start_time + high) * f64::from(clock.0);
-            let taken_back = out.last().is_some_and(|&(last, way)| way != forward && time - last < 6.0);
+            let taken_back =
+                out.last().is_some_and(|&(last, way)| way != forward && time - last < back_within);
             if taken_back {
                 out.pop();
             } else {
@@ -349,4 +351,86 @@ fn impossible_machines_and_moves_are_refused() {
     generator.end_run();
     assert_eq!(generator.pop(), None);
     assert_eq!(generator.push(&fast[0]), Err(PushError::Ended));
+}
+
+#[test]
+fn a_motor_that_waits_for_its_neighbour_never_blocks_a_busy_one() {
+    // Y steps once and rests. X goes on in pieces of one step each, thousands of them before Y's step is final.
+    let mut generator = generator(CLOCK);
+    generator.begin_run([0.0; 4]).unwrap();
+    let speed = 600.0;
+    let moving = |tag: u32, from: [f64; 4], to: [f64; 4], start_time: f64| {
+        let length = (to[0] - from[0]).abs() + (to[1] - from[1]).abs();
+        let direction = [(to[0] - from[0]) / length, (to[1] - from[1]) / length, 0.0, 0.0];
+        PlannedMove {
+            tag,
+            from,
+            to,
+            direction,
+            length,
+            start_time,
+            accel_time: 0.0,
+            cruise_time: length / speed,
+            decel_time: 0.0,
+            start_velocity: speed,
+            cruise_velocity: speed,
+            end_velocity: speed,
+            accel: 1000.0,
+        }
+    };
+    let mut at = [0.0, 0.0125, 0.0, 0.0];
+    let mut time = 0.0;
+    let mut out = Vec::new();
+    let first = moving(0, [0.0; 4], at, time);
+    generator.push(&first).unwrap();
+    time = first.end_time();
+    let steps = 20_000;
+    for tag in 1..=steps {
+        let to = [at[0] + 0.0125, at[1], 0.0, 0.0];
+        let planned = moving(tag, at, to, time);
+        if generator.push(&planned) == Err(PushError::Full) {
+            out.extend(std::iter::from_fn(|| generator.pop()));
+            generator.push(&planned).expect("room, once everything possible was taken");
+        }
+        (at, time) = (to, planned.end_time());
+    }
+    generator.end_run();
+    out.extend(std::iter::from_fn(|| generator.pop()));
+    assert_eq!(decompress(&out, 0).len(), steps as usize);
+    assert_eq!(decompress(&out, 1).len(), 1);
+}
+
+#[test]
+fn a_fast_straight_line_of_tiny_pieces_flows_however_it_is_taken() {
+    // Both motors run at a steady pace, the fast one with a piece of the path for every step: commands stay open for long.
+    let mut look_ahead = LookAhead::new(limits()).unwrap();
+    let mut planned = Vec::new();
+    for i in 1..20_000 {
+        let at = |i: i32| [f64::from(i) * 0.013, f64::from(i) * 0.002, 0.0, 0.0];
+        look_ahead.push(&MoveRequest { from: at(i - 1), to: at(i), feed: MmPerS(300.0), tag: 0 }).unwrap();
+        planned.extend(std::iter::from_fn(|| look_ahead.pop()));
+    }
+    look_ahead.flush();
+    planned.extend(std::iter::from_fn(|| look_ahead.pop()));
+    let taken = |every: usize| {
+        let mut generator = generator(CLOCK);
+        generator.begin_run([0.0; 4]).unwrap();
+        let mut out = Vec::new();
+        for (index, one) in planned.iter().enumerate() {
+            if generator.push(one) == Err(PushError::Full) {
+                out.extend(std::iter::from_fn(|| generator.pop()));
+                generator.push(one).expect("room, once everything possible was taken");
+            }
+            if index % every == 0 {
+                out.extend(std::iter::from_fn(|| generator.pop()));
+            }
+        }
+        generator.end_run();
+        out.extend(std::iter::from_fn(|| generator.pop()));
+        out
+    };
+    let out = taken(1);
+    check(&planned, &out, CLOCK);
+    assert_eq!(taken(100), out);
+    assert_eq!(taken(usize::MAX), out);
 }

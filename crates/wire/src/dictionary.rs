@@ -338,7 +338,8 @@ impl Dictionary {
         members.iter().find_map(|(first, value)| {
             let EnumerationValue::Row([value, count]) = value else { return None };
             let (first_root, first_at) = split_number(first)?;
-            (first_root == root && (first_at..first_at + count).contains(&at)).then(|| value + at - first_at)
+            let place = at.checked_sub(first_at).filter(|place| (0..*count).contains(place))?;
+            (first_root == root).then(|| value.checked_add(place))?
         })
     }
 
@@ -463,6 +464,18 @@ mod tests {
             dictionary.decode(&mut rest),
             Ok(Received::Known(Response::IdentifyResponse { offset: 3, data: &[7] }))
         );
+    }
+
+    #[test]
+    fn rows_without_end_are_no_harm() {
+        let json = r#"{"enumerations": {"pin": {"PA0": [9223372036854775807, 9223372036854775807],
+            "PB9223372036854775807": [1, 9223372036854775807], "PC3": [-5, -9223372036854775808]}}}"#;
+        let dictionary =
+            Dictionary::parse(&miniz_oxide::deflate::compress_to_vec_zlib(json.as_bytes(), 6)).unwrap();
+        assert_eq!(dictionary.enumeration("pin", "PA7"), None);
+        assert_eq!(dictionary.enumeration("pin", "PA9223372036854775806"), None);
+        assert_eq!(dictionary.enumeration("pin", "PB9"), None);
+        assert_eq!(dictionary.enumeration("pin", "PC4"), None);
     }
 
     #[test]

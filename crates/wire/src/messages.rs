@@ -48,6 +48,7 @@ integer_field! {
     u16, "%hu", |raw| raw.try_into().map_err(|_| DecodeError::OutOfRange);
     i16, "%hi", |raw| raw.try_into().map_err(|_| DecodeError::OutOfRange);
     u8, "%c", |raw| raw.try_into().map_err(|_| DecodeError::OutOfRange);
+    i8, "%c", |raw| raw.try_into().map_err(|_| DecodeError::OutOfRange);
 }
 
 impl<'a> Field<'a> for &'a [u8] {
@@ -257,8 +258,8 @@ messages! {
     /// Fires the trigger.
     TrsyncTrigger "trsync_trigger" { oid: u8, reason: u8 }
 
-    /// A switch input.
-    ConfigEndstop "config_endstop" { oid: u8, pin: u8, pull_up: u8 }
+    /// A switch input; `pull_up` is 1 for a resistor to the supply, -1 for one to ground, 0 for none.
+    ConfigEndstop "config_endstop" { oid: u8, pin: u8, pull_up: i8 }
     /// Asks for the state of a switch.
     EndstopQueryState "endstop_query_state" { oid: u8 }
     /// Watches a switch from `clock` on; `sample_count` equal samples in a row fire the trigger; 0 stops watching.

@@ -135,7 +135,11 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             Command::ConfigTrsync { oid } => (oid, Object::Trsync(Trsync::new())),
             Command::ConfigEndstop { oid, pin, pull_up } => {
                 self.objects.check_free(oid)?;
-                let pull = if pull_up == 0 { Pull::Floating } else { Pull::Up };
+                let pull = match pull_up {
+                    0 => Pull::Floating,
+                    1.. => Pull::Up,
+                    _ => Pull::Down,
+                };
                 (oid, Object::Endstop(Endstop::new(board, pin, pull)?))
             }
             Command::ConfigAnalogIn { oid, pin } => {

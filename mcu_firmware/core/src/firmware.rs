@@ -19,6 +19,10 @@ use crate::{
 
 /// A timer that falls this far behind shuts the board down: the step rate or the load is beyond the chip.
 const LATE_SECONDS_INVERSE: u32 = 1000;
+/// Timers that are due one after the other keep the main loop waiting for this part of that time at most …
+const BUSY_PART: u32 = 10;
+/// … and then let it run for this part, even if they fall behind.
+const REST_PART: u32 = 50;
 
 /// One board's firmware: `OBJECTS` is how many oids it has (at most 255), `MOVES` how many entries its move pool has
 /// (at most 65534).
@@ -46,12 +50,15 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
     /// Takes bytes from the host, in pieces of any size: answers and obeys.
     pub fn receive(&mut self, board: &mut impl Board, bytes: &[u8]) {
         let Self { deframer, core } = self;
-        core.uptime.look(board.now());
+        let now = board.now();
+        core.uptime.look(now);
+        core.timers.look(now);
         deframer.push(bytes, |frame| core.frame(board, frame));
     }
 
     /// Runs every timer that is due (not later than [`Board::now`]) and returns the clock at which to call it again,
-    /// which is later than now; there always is one, for the clock has to be looked at every few seconds.
+    /// which is later than now; there always is one, for the clock has to be looked at every few seconds. Timers that
+    /// never let up are left alone for a moment after a tenth of a millisecond, so that the main loop still runs.
     ///
     /// Called from the timer interrupt on a chip, by the event loop in a simulation; and whenever bytes have been
     /// received, since they may have started an earlier timer.
@@ -148,7 +155,9 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
 
     /// Runs for every edge of every step: what is rare is kept out of line.
     fn run_timers(&mut self, board: &mut impl Board) -> Clock32 {
-        let mut now = board.now();
+        let begin = board.now();
+        let mut now = begin;
+        self.timers.look(now);
         if !now.is_before(self.look_at) || self.stats.is_new() {
             self.look(now);
         }
@@ -156,7 +165,10 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             if now.is_before(wake) {
                 now = board.now();
                 if now.is_before(wake) {
-                    return if self.look_at.is_before(wake) { self.look_at } else { wake };
+                    return if self.look_at.is_before(wake) { self.next_look(now) } else { wake };
+                }
+                if now.since(begin) as u32 > self.late_ticks / BUSY_PART {
+                    return now.wrapping_add(self.late_ticks / REST_PART + 1);
                 }
             }
             if now.since(wake) as u32 > self.late_ticks {
@@ -173,7 +185,12 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
                 self.run_timer(board, oid, wake);
             }
         }
-        self.look_at
+        self.next_look(board.now())
+    }
+
+    /// When the clock has to be looked at again: after now, even where that is overdue.
+    fn next_look(&self, now: Clock32) -> Clock32 {
+        if now.is_before(self.look_at) { self.look_at } else { now.wrapping_add(1) }
     }
 
     /// Looks at the clock, which is due every few seconds.

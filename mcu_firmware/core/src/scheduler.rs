@@ -20,8 +20,14 @@ struct Node {
     active: bool,
 }
 
-/// At most one timer for each number below `N`. Order holds as long as all are less than 2³¹ ticks apart.
+/// How far back the clocks that are told apart reach: a timer may be late, and the clock goes on between two looks.
+const BEHIND_TICKS: u32 = 1 << 30;
+
+/// At most one timer for each number below `N`, due from a little before the clock last seen to 2³¹ ticks after.
 pub(crate) struct Timers<const N: usize> {
+    /// No timer is due before this clock: they are ordered by the distance from it, so that a late one and one that is
+    /// 2³¹ ticks ahead do not change places.
+    epoch: Clock32,
     nodes: [Node; N],
     head: u8,
 }
@@ -29,7 +35,22 @@ pub(crate) struct Timers<const N: usize> {
 impl<const N: usize> Timers<N> {
     pub(crate) const fn new() -> Self {
         assert!(N <= TIMERS_MAX, "timers are numbered by a byte");
-        Self { nodes: [Node { wake: Clock32(0), next: NONE, active: false }; N], head: NONE }
+        Self {
+            nodes: [Node { wake: Clock32(0), next: NONE, active: false }; N],
+            head: NONE,
+            epoch: Clock32(0),
+        }
+    }
+
+    /// Sees the clock. Has to be shown it at least once in every 2³⁰ ticks.
+    #[inline]
+    pub(crate) fn look(&mut self, now: Clock32) {
+        self.epoch = now.wrapping_add(BEHIND_TICKS.wrapping_neg());
+    }
+
+    #[inline]
+    const fn is_before(&self, wake: Clock32, other: Clock32) -> bool {
+        wake.0.wrapping_sub(self.epoch.0) < other.0.wrapping_sub(self.epoch.0)
     }
 
     /// The timer that is due first.
@@ -52,7 +73,7 @@ impl<const N: usize> Timers<N> {
         node.wake = wake;
         let second = node.next;
         if let Some(next) = self.nodes.get(usize::from(second))
-            && !wake.is_before(next.wake)
+            && !self.is_before(wake, next.wake)
         {
             self.head = second;
             self.insert_after(second, id, wake);
@@ -81,7 +102,7 @@ impl<const N: usize> Timers<N> {
 
     /// Stops all timers.
     pub(crate) fn clear(&mut self) {
-        *self = Self::new();
+        *self = Self { epoch: self.epoch, ..Self::new() };
     }
 
     fn insert(&mut self, id: u8, wake: Clock32) {
@@ -89,7 +110,7 @@ impl<const N: usize> Timers<N> {
         node.active = true;
         let head = self.head;
         match self.nodes.get(usize::from(head)) {
-            Some(first) if !wake.is_before(first.wake) => self.insert_after(head, id, wake),
+            Some(first) if !self.is_before(wake, first.wake) => self.insert_after(head, id, wake),
             _ => {
                 let node = &mut self.nodes[usize::from(id)];
                 node.wake = wake;
@@ -104,7 +125,7 @@ impl<const N: usize> Timers<N> {
     fn insert_after(&mut self, mut at: u8, id: u8, wake: Clock32) {
         let mut next = self.nodes[usize::from(at)].next;
         while let Some(node) = self.nodes.get(usize::from(next)) {
-            if wake.is_before(node.wake) {
+            if self.is_before(wake, node.wake) {
                 break;
             }
             at = next;
@@ -138,6 +159,7 @@ mod tests {
     #[test]
     fn equal_times_run_in_the_order_of_their_coming() {
         let mut timers = Timers::<N>::new();
+        timers.look(Clock32(u32::MAX));
         for id in [3, 1, 2] {
             timers.schedule(id, Clock32(u32::MAX));
         }
@@ -147,10 +169,25 @@ mod tests {
         assert_eq!(order, [1, 2, 3, 0]);
     }
 
+    #[test]
+    fn a_late_timer_goes_before_one_as_far_ahead_as_can_be() {
+        for now in [0, 5, u32::MAX - 5, 1 << 31].map(Clock32) {
+            let mut timers = Timers::<N>::new();
+            timers.look(now);
+            timers.schedule(1, now.wrapping_add(i32::MAX as u32));
+            timers.schedule(0, now);
+            timers.reschedule_first(now.wrapping_add(10_u32.wrapping_neg()));
+            timers.schedule(2, now.wrapping_add(5_u32.wrapping_neg()));
+            let order: Vec<_> = drain(&mut timers).iter().map(|&(id, _)| id).collect();
+            assert_eq!(order, [0, 2, 1]);
+        }
+    }
+
     proptest! {
         #[test]
         fn it_agrees_with_a_sorted_list(base: u32, operations in prop::collection::vec((0..3_u8, 0..N as u8, 0..1000_i32), 0..200)) {
             let mut timers = Timers::<N>::new();
+            timers.look(Clock32(base));
             let mut model: Vec<(u8, i32)> = Vec::new();
             let insert = |model: &mut Vec<(u8, i32)>, id, at| {
                 let place = model.iter().position(|&(_, other)| other > at).unwrap_or(model.len());

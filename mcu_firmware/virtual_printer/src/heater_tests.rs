@@ -48,12 +48,12 @@ fn regulate(seconds: f64, load: impl Fn(f64) -> (f64, f64, f64), mut seen: impl 
 fn a_hot_end_warms_as_hot_ends_do() {
     let mut heater = HeaterState::new(Plant::hot_end());
     let mut steps = 0;
-    while heater.body_c < 200.0 && steps < 20_000 {
+    while heater.body_c < 210.0 && steps < 20_000 {
         heater.step(1.0, 0.0, 0.0);
         steps += 1;
     }
     let took_s = f64::from(steps) * THERMAL_STEP_S;
-    assert!((50.0..90.0).contains(&took_s), "{took_s}");
+    assert!((60.0..90.0).contains(&took_s), "{took_s}");
     for _ in 0..60_000 {
         heater.step(0.0, 0.0, 0.0);
     }
@@ -97,7 +97,8 @@ fn a_bed_is_held_by_switching_it_on_and_off() {
             high = high.max(bed.body_c);
         }
     }
-    assert!((5_000..30_000).contains(&steps_to_60), "{steps_to_60}");
+    // 250 W on 3 mm of aluminium, a steel sheet and the heater itself: two minutes, more or less.
+    assert!((9_000..18_000).contains(&steps_to_60), "{steps_to_60}");
     assert!(low > 56.0 && high < 66.0, "{low} .. {high}");
 }
 

@@ -109,7 +109,8 @@ pub struct Machine {
     pub heaters: Vec<Heater>,
     /// Fans.
     pub fans: Vec<Fan>,
-    /// The step of time of the motors' integration, at most [`TIME_STEP_US`]; smaller ones change no result.
+    /// The step of time of the motors' integration, at most [`TIME_STEP_US`]; smaller ones change no
+    /// result, unless a motor is within a hundredth of what it can do.
     pub time_step_us: u32,
 }
 

@@ -17,6 +17,9 @@ use crate::switch::Switch;
 
 /// The longest step of time of the integration. A tenth of a radian of the swing of usual motors.
 pub const TIME_STEP_US: u32 = 100;
+const TIME_STEP_S: f64 = TIME_STEP_US as f64 * 1e-6;
+/// Whatever changes by more than this part in a step of time is not integrated faithfully.
+const RATE_PER_STEP_MAX: f64 = 0.5;
 /// Where the field turns by more than 1/16 of an electrical period in a step of time, the step is divided.
 const PERIODS_PER_SUBSTEP_MAX: f64 = 1.0 / 16.0;
 /// At most so many parts; a field that fast drags no rotor anyway.
@@ -38,7 +41,7 @@ pub struct Mechanics {
     pub full_steps_per_rotation: u32,
     /// Microsteps per full step, as the driver is set.
     pub microsteps: u32,
-    /// Greatest torque at low speed, in newton metres.
+    /// Greatest torque at low speed and the driver's current, in newton metres.
     pub holding_torque_nm: f64,
     /// Turns per second beyond which the torque falls as 1/speed.
     pub corner_speed_rev_s: f64,
@@ -59,14 +62,15 @@ const TURN_RAD: f64 = core::f64::consts::TAU;
 const NEMA17_ROTOR_KG_M2: f64 = 5.4e-6;
 
 impl Mechanics {
-    /// A NEMA 17 motor (0.4 N·m, 24 V) that moves a mass by a belt or a screw.
+    /// A NEMA 17 motor (0.4 N·m at its rated current, of which the driver is set to three quarters; 24 V) that moves a
+    /// mass by a belt or a screw.
     pub fn nema17(microsteps: u32, mm_per_rotation: f64, moved_kg: f64) -> Self {
         let lever_m = mm_per_rotation / 1000.0 / TURN_RAD;
         Self {
             full_steps_per_rotation: 200,
             microsteps,
-            holding_torque_nm: 0.4,
-            corner_speed_rev_s: 8.0,
+            holding_torque_nm: 0.3,
+            corner_speed_rev_s: 6.0,
             inertia_kg_m2: NEMA17_ROTOR_KG_M2 + moved_kg * lever_m * lever_m,
             friction_nm: 0.03,
             drag_nm_s: 1e-4,
@@ -85,7 +89,13 @@ impl Mechanics {
         f64::from(self.full_steps_per_rotation) * f64::from(self.microsteps)
     }
 
-    /// Whether all values are finite and make a motor.
+    /// Angular frequency of small swings of the rotor around the field, in rad/s.
+    fn swing_rad_s(&self) -> f64 {
+        let electrical_per_mechanical = f64::from(self.full_steps_per_rotation) / 4.0;
+        (self.holding_torque_nm * electrical_per_mechanical / self.inertia_kg_m2).sqrt()
+    }
+
+    /// Whether all values are finite and make a motor, one that [`TIME_STEP_US`] is short enough for.
     pub fn is_sound(&self) -> bool {
         let positive = [self.holding_torque_nm, self.corner_speed_rev_s, self.inertia_kg_m2];
         let not_negative = [self.friction_nm, self.drag_nm_s, self.damping_ratio];
@@ -94,6 +104,9 @@ impl Mechanics {
             && self.load_nm.is_finite()
             && (4..=4000).contains(&self.full_steps_per_rotation)
             && (1..=256).contains(&self.microsteps)
+            && self.swing_rad_s() * TIME_STEP_S < RATE_PER_STEP_MAX
+            && 2.0 * self.damping_ratio * self.swing_rad_s() * TIME_STEP_S < RATE_PER_STEP_MAX
+            && self.drag_nm_s / self.inertia_kg_m2 * TIME_STEP_S < RATE_PER_STEP_MAX
     }
 }
 
@@ -120,8 +133,7 @@ impl Model {
         let acceleration = |torque_nm: f64| torque_nm / mechanics.inertia_kg_m2 * per_rad;
         let period = 4.0 * f64::from(mechanics.microsteps);
         let pull = acceleration(mechanics.holding_torque_nm);
-        // Of small swings: ω₀² is the slope of the torque at rest over the inertia.
-        let natural_rad_s = (pull * TURN_RAD / period).sqrt();
+        let natural_rad_s = mechanics.swing_rad_s();
         Self {
             period,
             per_period: 1.0 / period,

@@ -155,6 +155,7 @@ impl Pipe {
         self.bytes.clear();
         self.parcels.clear();
         self.busy_until = 0;
+        self.last_arrival = 0;
     }
 }
 
@@ -232,6 +233,16 @@ mod tests {
             pipe.take(at, &mut out);
         }
         assert!(late > 12_000_000 / 50, "{late}");
+    }
+
+    #[test]
+    fn what_was_lost_holds_up_nothing() {
+        let mut pipe = pipe(UART, ByteFaults::default());
+        pipe.send(0, &vec![0; 25_000]);
+        pipe.clear();
+        pipe.send(12_000, &[1]);
+        let at = pipe.next_arrival().unwrap_or(u64::MAX);
+        assert!(at < 36_000, "a second's worth of lost bytes lies between: {at}");
     }
 
     #[test]

@@ -94,7 +94,7 @@ impl<R: Recorder> VirtualPrinter<R> {
     fn schedule(&mut self, failures: &[Failure]) -> Result<(), WiringError> {
         for failure in failures {
             self.check_target(&failure.kind)?;
-            let at = self.board.clock + self.board.profile.clock.ticks_in(failure.at).0;
+            let at = self.board.clock.saturating_add(self.board.profile.clock.ticks_in(failure.at).0);
             self.failures.push((at, failure.kind.clone()));
         }
         // Stable: what is given for the same time happens in the order given.

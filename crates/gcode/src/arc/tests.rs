@@ -93,8 +93,8 @@ proptest! {
         tolerance in 0.0005f64..0.5,
     ) {
         let turned = start + if clockwise { -sweep } else { sweep };
-        let from = at(radius * start.cos(), radius * start.sin(), 0.0, 5.0);
-        let to = at(radius * turned.cos(), radius * turned.sin(), rise, 6.0);
+        let from = at(radius * libm::cos(start), radius * libm::sin(start), 0.0, 5.0);
+        let to = at(radius * libm::cos(turned), radius * libm::sin(turned), rise, 6.0);
         let arc = arc(from, to, Plane::Xy, clockwise, Centre::Offset([-from.x, -from.y])).unwrap();
         prop_assert!((arc.angle.abs() - sweep).abs() < 1e-6);
         let mut last = from;
@@ -115,7 +115,21 @@ proptest! {
     fn no_more_chords_than_the_tolerance_needs(radius in 1.0f64..100.0) {
         let from = at(radius, 0.0, 0.0, 0.0);
         let circle = arc(from, from, Plane::Xy, true, Centre::Offset([-radius, 0.0])).unwrap();
-        let step = 2.0 * (1.0 - 0.005 / radius).acos();
+        let step = 2.0 * libm::acos(1.0 - 0.005 / radius);
         prop_assert!(circle.chords(CHORD_TOLERANCE).count() as f64 <= (TAU / step).ceil() + 1.0);
+    }
+}
+
+#[test]
+fn dust_from_adding_up_relative_moves_neither_loses_nor_makes_a_full_circle() {
+    // Ends a hundredth of a nanometre apart on either side of the start are meant to be the start.
+    for dust in [-1e-11, 0.0, 1e-11] {
+        for clockwise in [false, true] {
+            let turn =
+                Turn { plane: Plane::Xy, clockwise, centre: Centre::Offset([-5.0, 0.0]), extra_turns: 0.0 };
+            let (from, to) = (at(10.0, 0.0, 0.0, 0.0), at(10.0, dust, 0.0, 1.0));
+            let (arc, _) = Arc::new(LineNumber(1), from, to, MmPerS(10.0), turn).unwrap();
+            assert!((arc.angle.abs() - TAU).abs() < 1e-9, "{dust} {clockwise}: {}", arc.angle);
+        }
     }
 }

@@ -38,8 +38,10 @@ impl Interpreter {
             0 | 1 | 25 | 226 | 601 => out.act(Action::Pause(PauseReason::Requested)),
             600 => out.act(Action::Pause(PauseReason::FilamentChange)),
             18 | 84 => self.with_words(code, bytes, u32::MAX, out, |it, out| it.motors_off(code, out)),
-            82 => self.relative_e = false,
-            83 => self.relative_e = true,
+            82 | 83 => self.with_words(code, bytes, 0, out, |it, out| {
+                it.unused_words(0, out);
+                it.relative_e = code.number == 83;
+            }),
             104 | 140 | 141 => self.temperature(code, bytes, Wait::No, out),
             109 | 190 | 191 => self.temperature(code, bytes, Wait::UntilHeated, out),
             105 => out.act(Action::ReportTemperatures),
@@ -53,7 +55,10 @@ impl Interpreter {
                 let end = memchr::memchr(b';', bytes).unwrap_or(bytes.len());
                 out.act(Action::Message(text_of(bytes[code.end..end.max(code.end)].trim_ascii())));
             }
-            400 => out.act(Action::WaitForMoves),
+            400 => self.with_words(code, bytes, 0, out, |it, out| {
+                it.unused_words(0, out);
+                out.act(Action::WaitForMoves);
+            }),
             486 => self.objects(code, bytes, out),
             _ => self.m_setting(code, bytes, out),
         }

@@ -230,6 +230,11 @@ impl Interpreter {
         }
     }
 
+    /// Where a move was not made: the machine stands here (mm), whatever was commanded. `G92` offsets hold.
+    pub fn stand_at(&mut self, x: f64, y: f64, z: f64) {
+        self.position[..3].copy_from_slice(&[x, y, z]);
+    }
+
     /// The speed factor, 1 = as the file says.
     pub fn speed_factor(&self) -> f64 {
         self.speed_factor

@@ -30,25 +30,36 @@ impl Interpreter {
             (4, None) => self.with_words(code, bytes, 0, out, |it, out| it.dwell(code, out)),
             (10, None) => self.with_words(code, bytes, 0, out, |it, out| it.retract(code, out)),
             (11, None) => self.with_words(code, bytes, 0, out, super::Interpreter::unretract),
-            (17..=19, None) => {
-                self.plane = [Plane::Xy, Plane::Zx, Plane::Yz][code.number as usize - 17];
-            }
-            (20, None) => self.rescale_e(INCH_MM, self.flow_factor),
-            (21, None) => self.rescale_e(1.0, self.flow_factor),
             // All letters: Prusa adds `W`, Marlin `O` and `R`.
             (28, None) => self.with_words(code, bytes, u32::MAX, out, super::Interpreter::home),
-            (90, None) => self.relative = false,
-            (91, None) => self.relative = true,
             (92, None) => self.with_words(code, bytes, 0, out, |it, out| it.set_position(axes, out)),
-            (92, Some(1)) => self.offset[..3].copy_from_slice(&[0.0, 0.0, self.hop]),
-            // Machine coordinates are all there is; feed is per minute, and exact stop and blending are the planner's.
-            (53 | 61 | 64 | 94, None) => {}
+            (17..=21 | 53 | 61 | 64 | 90 | 91 | 94, None) | (92, Some(1)) => {
+                self.with_words(code, bytes, 0, out, |it, out| it.mode(code, out));
+            }
             (29 | 30 | 32 | 33 | 34 | 35 | 80, _) => {
                 let message = "Bed levelling and probing are not available here. The line would be skipped: level the bed \
                                by hand, then confirm.";
                 out.say(Blocking, DiagnosticCode::UnsupportedCommand, code.columns(), message);
             }
             _ => super::unknown(code, bytes, out),
+        }
+    }
+
+    /// Commands that take no words. They are read all the same, so that none is passed over in silence.
+    fn mode(&mut self, code: Code, out: &mut Out<'_>) {
+        self.unused_words(0, out);
+        match code.number {
+            17 => self.plane = Plane::Xy,
+            18 => self.plane = Plane::Zx,
+            19 => self.plane = Plane::Yz,
+            20 => self.rescale_e(INCH_MM, self.flow_factor),
+            21 => self.rescale_e(1.0, self.flow_factor),
+            90 => self.relative = false,
+            91 => self.relative = true,
+            // `G92.1`
+            92 => self.offset[..3].copy_from_slice(&[0.0, 0.0, self.hop]),
+            // Alone, `G53` changes nothing; feed is per minute, and exact stop and blending are the planner's.
+            _ => {}
         }
     }
 

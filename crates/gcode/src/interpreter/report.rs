@@ -1,10 +1,14 @@
 //! Lines that are not as they should be: words, checksums, line numbers.
 
 use super::{Interpreter, Out};
+use crate::annotation::text_of;
 use crate::diagnostic::DiagnosticCode as Code;
 use crate::diagnostic::Severity::{Blocking, Error, Info};
 use crate::lines::LINE_BYTES_MAX;
 use crate::words::{WordFault, WordsEnd};
+
+/// What some editors put before the first line.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Says what is wrong with the words of a line.
 #[cold]
@@ -12,7 +16,7 @@ pub(super) fn word_fault(fault: &WordFault, bytes: &[u8], out: &mut Out<'_>) {
     let skipped = "The line is skipped; slice the file again.";
     match fault.clone() {
         WordFault::NoLetter(at) => {
-            let text = String::from_utf8_lossy(&bytes[at.clone()]).into_owned();
+            let text = text_of(&bytes[at.clone()]);
             out.say(Error, Code::MalformedWord, at, format!("`{text}` is not a letter with a number. {skipped}"));
         }
         WordFault::NotText(at) => {
@@ -22,6 +26,11 @@ pub(super) fn word_fault(fault: &WordFault, bytes: &[u8], out: &mut Out<'_>) {
         WordFault::Duplicate(letter, at) => {
             let letter = char::from(letter);
             out.say(Error, Code::DuplicateWord, at, format!("`{letter}` occurs twice in this line. {skipped}"));
+        }
+        WordFault::SecondCommand(at) => {
+            let message = "A second command begins here, but only one a line is read. The line is skipped: write each command \
+                           on a line of its own.";
+            out.say(Error, Code::SeveralCommands, at, message);
         }
         WordFault::Exponent(at) => out.say(
             Error,
@@ -96,9 +105,12 @@ impl Interpreter {
     /// A line that begins with none of the letters: a comment in brackets, a `%`, a byte order mark, or garbage.
     #[cold]
     pub(super) fn odd(&mut self, bytes: &[u8], at: usize, out: &mut Out<'_>) {
-        if let Some(rest) = bytes[at..].strip_prefix(b"\xef\xbb\xbf")
+        if let Some(rest) = bytes[at..].strip_prefix(BYTE_ORDER_MARK)
             && out.line.0 == 1
         {
+            if rest.starts_with(BYTE_ORDER_MARK) {
+                return word_fault(&WordFault::NotText(at + 3..at + 4), bytes, out);
+            }
             let (line, mut actions, mut diagnostics) = (out.line, Vec::new(), Vec::new());
             self.line(line, rest, &mut actions, &mut diagnostics);
             for diagnostic in &mut diagnostics {
@@ -111,7 +123,7 @@ impl Interpreter {
         if bytes[at] == b'%' && bytes[at + 1..].trim_ascii().is_empty() {
             return;
         }
-        match self.words.scan(bytes, at) {
+        match self.words.scan_any(bytes, at) {
             Ok(end) if self.words.present() == 0 => {
                 self.check_words(bytes, 0, end, out);
             }

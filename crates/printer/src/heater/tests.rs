@@ -211,6 +211,20 @@ fn a_dead_heater_is_found_in_the_time_to_gain() {
 }
 
 #[test]
+fn a_dead_heater_is_found_though_its_target_keeps_changing() {
+    let mut bench = Bench::new(hot_end(), Plant::hot_end());
+    bench.plant.power_w = 0.0;
+    let mut fault = None;
+    for round in 0..60 {
+        bench.heater.set_target(Celsius(if round % 2 == 0 { 200.0 } else { 201.0 })).ok();
+        for _ in 0..10 {
+            fault = fault.or(bench.step().err());
+        }
+    }
+    assert_eq!(fault, Some(HeaterFault::NotHeating));
+}
+
+#[test]
 fn a_heater_that_dies_while_printing_is_found() {
     let mut bench = Bench::new(hot_end(), Plant::hot_end());
     bench.heater.set_target(Celsius(205.0)).unwrap();

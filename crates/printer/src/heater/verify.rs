@@ -77,7 +77,8 @@ impl VerifyHeater {
             self.error_c_s = 0.0;
             return Ok(());
         }
-        if retargeted {
+        // A climb goes on whatever the new target is: one that changes all the time must not keep putting the check off.
+        if retargeted && !matches!(self.state, State::Climbing { .. }) {
             self.climb_from(temperature, now, true);
             return Ok(());
         }

@@ -235,6 +235,11 @@ impl Lanes {
         }
     }
 
+    /// The clock that the control lane waits for, where it lies after `now`.
+    pub(super) fn control_clock(&self, now: Ticks) -> Option<Ticks> {
+        self.control.front().map(|front| front.min_clock).filter(|&clock| clock > now)
+    }
+
     /// The clock at which the first of the lanes' fronts may be sent and has waited long enough for company.
     pub(super) fn next_clock(&self, urgent_lead: Ticks) -> Option<Ticks> {
         let motion = self

@@ -89,9 +89,11 @@ pub struct LinkStats {
     pub last_received: Option<Seconds>,
 }
 
-/// Motion that may be sent but waits for its block to fill.
+/// What may be sent but waits: motion for its block to fill, or a long message for room at the board.
 #[derive(Clone, Copy, Debug, Default)]
 struct Held {
+    /// The next message is too long for the room that the board has left.
+    crowded: bool,
     /// Something waits for entries of the move queue to come free.
     starved: bool,
     /// The earliest clock at which any of the motion in the block is due.
@@ -282,7 +284,12 @@ impl Link {
             };
             let draft = self.lanes.draft(&gate, &self.moves);
             if draft.is_empty() || !self.goes_now(&draft, clock_now) {
-                return Held { starved: draft.starved, due: draft.motion.due };
+                return Held { starved: draft.starved, due: draft.motion.due, crowded: false };
+            }
+            // Short blocks may hold one long message. The immediate lane waits for nobody.
+            let waits_for_room = self.lanes.len(Lane::Immediate) == 0;
+            if waits_for_room && !self.has_room_for(draft.payload().len()) {
+                return Held { crowded: true, ..Held::default() };
             }
             self.lanes.commit(&draft, &mut self.moves);
             self.window.send(draft.payload(), draft.motion, now.0, out);
@@ -295,15 +302,19 @@ impl Link {
     fn room_on_the_line(&self) -> Option<(usize, bool)> {
         let payload_bytes = self.window.loss.payload_bytes();
         let blocks = self.window.blocks();
-        let full_bytes =
-            self.receive_window.saturating_sub(self.window.bytes()) < BLOCK_BYTES_MIN + payload_bytes;
-        if blocks < self.window.loss.window_blocks() && (!full_bytes || blocks == 0) {
+        if blocks < self.window.loss.window_blocks() && self.has_room_for(payload_bytes) {
             Some((payload_bytes, false))
         } else if blocks < WINDOW_BLOCKS_IMMEDIATE_MAX && self.lanes.len(Lane::Immediate) > 0 {
             Some((payload_bytes, true))
         } else {
             None
         }
+    }
+
+    /// Whether the board has room for a block with so many message bytes.
+    fn has_room_for(&self, payload_bytes: usize) -> bool {
+        let room = self.receive_window.saturating_sub(self.window.bytes());
+        self.window.blocks() == 0 || BLOCK_BYTES_MIN + payload_bytes <= room
     }
 
     /// How long before it is due motion is sent even in a block that is not full.
@@ -325,14 +336,14 @@ impl Link {
     /// When something is to be done, if nothing arrives before.
     fn next_wake(&self, now: Seconds, clock_now: Ticks, held: Held) -> Option<f64> {
         let resend = self.window.resend_due_s();
-        if self.room_on_the_line().is_none() {
+        if held.crowded || self.room_on_the_line().is_none() {
             return resend;
         }
         let send = if held.starved {
             let urgent = held.due.map(|due| due.saturating_sub(self.urgent_lead(true)));
             let released = self.moves.next_release();
             let released = released.map(|clock| clock + self.clock.ticks_in(Seconds(ENTRIES_WAIT_S)));
-            urgent.into_iter().chain(released).min()
+            urgent.into_iter().chain(released).chain(self.lanes.control_clock(clock_now)).min()
         } else {
             self.lanes.next_clock(self.urgent_lead(false))
         };

@@ -384,3 +384,37 @@ fn an_answer_tells_when_its_question_was_sent_unless_that_is_in_doubt() {
         line.heard.iter().filter_map(|(received, sent)| Some(received.0 - (*sent)?.0)).fold(0.0, f64::max);
     assert!(longest < 0.0035, "{longest}");
 }
+
+#[test]
+fn the_boards_room_is_never_exceeded_by_a_message_longer_than_shortened_blocks() {
+    const ROOM: usize = BLOCK_BYTES_MAX;
+    let mut line = connected(1);
+    line.link.set_receive_window(ROOM);
+    // A bad line has made blocks short.
+    (0..200).for_each(|_| line.link.window.loss.lost());
+    for number in 0..60 {
+        let long = Outgoing::from_bytes(Lane::Control, &[1; 50]).unwrap();
+        line.link.queue(if number % 4 == 3 { long } else { message(Lane::Control, number) }).unwrap();
+    }
+    let done = line.run(10.0, |line| {
+        let (_, bytes) = line.link.unacknowledged();
+        assert!(bytes <= ROOM, "{bytes} bytes on the way");
+        line.link.is_idle()
+    });
+    assert!(done);
+}
+
+#[test]
+fn a_message_that_waits_for_its_clock_does_not_wait_for_a_full_move_queue() {
+    let mut line = connected(1);
+    line.link.set_board(CLOCK, 64);
+    for number in 0..100 {
+        line.link.queue(step(0, number, 1.0, 50.0)).unwrap();
+    }
+    line.run(0.7, |_| false);
+    assert_eq!(line.link.moves().free_for_motion(), 0);
+    let before = arrivals(&line).len();
+    line.link.queue(message(Lane::Control, 1).not_before(at(0.8))).unwrap();
+    line.run(0.81, |_| false);
+    assert_eq!(arrivals(&line)[before..], [(mark(Lane::Control), 1)]);
+}

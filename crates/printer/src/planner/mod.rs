@@ -6,134 +6,29 @@
 //! motion**, which is a stretch that begins and ends at rest.
 
 mod guard;
+mod item;
 mod report;
 mod source;
+#[cfg(test)]
+mod tests;
 
 use std::collections::VecDeque;
 
-use gcode::{
-    Action, Annotation, CHORD_TOLERANCE, Diagnostic, DiagnosticCode, Heater, LineNumber, Move, ObjectAction,
-    PauseReason, Severity, VelocityLimit, Wait,
-};
+use gcode::{Action, Diagnostic, DiagnosticCode, LineNumber, Move, Severity, VelocityLimit, Wait};
 use motion::{Limits, LookAhead, MoveRequest, PlannedMove};
-use steps::{StepCommand, StepGenerator};
-use units::{Celsius, Hertz, MmPerS, Seconds, Ticks};
+use steps::{PushError, StepGenerator};
+use units::{Hertz, MmPerS, Seconds, Ticks};
 
 pub use guard::{ExtrusionPermit, Guard};
+pub use item::{Barrier, Planned, Position, TimedAction};
 pub use report::{MotorReport, PLAN_CLOCK, PlanReport, PlanStream};
 pub use source::{SOURCE_BYTES_MAX, Source};
 
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
-    machine,
+    machine::{self, EXTRUDER, MOTORS},
 };
-
-/// A machine position: X, Y, Z in mm and the extruder in mm of filament.
-pub type Position = [f64; 4];
-
-/// Something that happens at a time of the run without stopping it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum TimedAction {
-    /// A heater gets a new target; the print does not wait for it.
-    SetTemperature {
-        /// Which heater.
-        heater: Heater,
-        /// Its new target; 0 is off.
-        target: Celsius,
-    },
-    /// Every heater goes off.
-    TurnOffHeaters,
-    /// A fan gets a new speed.
-    Fan {
-        /// Which fan.
-        index: u8,
-        /// 0 ..= 1.
-        speed: f64,
-    },
-    /// A text for the user.
-    Message(String),
-    /// A comment of the slicer's that means something.
-    Annotation(Annotation),
-    /// One of several objects on the bed begins, ends or is defined.
-    Object(ObjectAction),
-    /// The source asked for temperatures.
-    ReportTemperatures,
-    /// The source asked for the position.
-    ReportPosition,
-}
-
-/// Something that the machine must be at rest for, and that may take any time.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Barrier {
-    /// Home these axes; the owner then calls [`Planner::set_axis`] and the interpreter's `set_axes`.
-    Home([bool; 3]),
-    /// Set a target and wait until the heater is there.
-    WaitTemperature {
-        /// Which heater.
-        heater: Heater,
-        /// Its new target.
-        target: Celsius,
-        /// When the wait ends.
-        wait: Wait,
-    },
-    /// Wait at rest.
-    Dwell(Seconds),
-    /// Release these motors (X, Y, Z, E).
-    MotorsOff([bool; 4]),
-    /// Nothing but coming to rest.
-    WaitForMoves,
-    /// Stop here until the user says so.
-    Pause(PauseReason),
-    /// End the job here.
-    Cancel,
-    /// Wait until a heater is within bounds.
-    WaitForTemperature {
-        /// Which heater.
-        heater: Heater,
-        /// Not below this.
-        minimum: Option<Celsius>,
-        /// Not above this.
-        maximum: Option<Celsius>,
-    },
-    /// Stop everything at once.
-    EmergencyStop,
-}
-
-/// One item of the plan, in the order in which it has to be handled.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Planned {
-    /// A run of motion starts at rest at this position.
-    RunStarted(Position),
-    /// A move's final speeds; its steps follow, though not at once.
-    Move(PlannedMove),
-    /// A motor's next step command.
-    Steps(StepCommand),
-    /// Something that happens on the way.
-    Timed {
-        /// Print time from the start of the run.
-        at: Seconds,
-        /// The line that asked for it.
-        line: LineNumber,
-        /// What happens.
-        action: TimedAction,
-    },
-    /// The run ends at rest at this print time, and all its step commands have been handed out.
-    RunEnded(Seconds),
-    /// The machine is at rest, and this has to be done before anything else.
-    Barrier {
-        /// The line that asked for it.
-        line: LineNumber,
-        /// What has to be done.
-        barrier: Barrier,
-    },
-    /// Something in the source that the user should know of. Blocking ones that nobody confirmed are errors instead.
-    Notice(Diagnostic),
-    /// The source must be fed.
-    NeedsInput,
-    /// The source has ended, and the machine is at rest.
-    EndOfSource,
-}
 
 /// How far the run of motion is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,14 +45,25 @@ enum Run {
 
 #[derive(Clone, Debug)]
 struct Deferred {
-    /// How many moves come before it.
+    /// How many moves come before it …
     after: u64,
+    /// … and the dwell, if there is one, until this print time.
+    not_before: Seconds,
     line: LineNumber,
     action: TimedAction,
 }
 
 /// The most timed actions that wait for their move at once: more end the run, so that memory stays bounded.
 const DEFERRED_MAX: usize = 4096;
+/// Longer dwells end the run of motion, so that a print can be paused or cancelled while it waits.
+const DWELL_IN_RUN_MAX: Seconds = Seconds(2.0);
+
+/// What is said of a source once, however often it asks for it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Said {
+    pressure_advance: bool,
+    other_fans: bool,
+}
 
 /// Turns G-code into step commands.
 #[derive(Debug)]
@@ -169,16 +75,20 @@ pub struct Planner {
     look_ahead: LookAhead,
     generator: StepGenerator,
     position: Position,
-    /// The toolhead's extruder position less the interpreter's, which counts from its own start.
-    e_offset: f64,
     run: Run,
     moves_pushed: u64,
     moves_planned: u64,
     /// Print time at which the last planned move ends.
     planned_until: Seconds,
+    /// Print time at which the last dwell of this run ends.
+    dwelt_until: Seconds,
     deferred: VecDeque<Deferred>,
     ready: VecDeque<Planned>,
     barrier: Option<(LineNumber, Barrier)>,
+    said: Said,
+    /// What each motor's driver can follow, as the speed of its axis.
+    motor_speed_max: [MmPerS; MOTORS],
+    is_broken: bool,
 }
 
 impl Planner {
@@ -194,14 +104,17 @@ impl Planner {
             limits,
             generator: machine::step_generator(config, clock)?,
             position: [0.0; 4],
-            e_offset: 0.0,
             run: Run::None,
             moves_pushed: 0,
             moves_planned: 0,
             planned_until: Seconds::ZERO,
+            dwelt_until: Seconds::ZERO,
             deferred: VecDeque::new(),
             ready: VecDeque::new(),
             barrier: None,
+            said: Said::default(),
+            motor_speed_max: machine::motor_speeds_max(config, clock),
+            is_broken: false,
         })
     }
 
@@ -220,9 +133,9 @@ impl Planner {
         self.planned_until
     }
 
-    /// Run clock up to which step commands have been handed out.
-    pub fn generated_until(&self) -> Ticks {
-        self.generator.settled()
+    /// Run clock up to which step commands have been handed out; `None` once all of the run's have been.
+    pub fn generated_until(&self) -> Option<Ticks> {
+        Some(self.generator.settled()).filter(|&settled| settled != Ticks(u64::MAX))
     }
 
     /// What the step generator counted so far.
@@ -237,17 +150,42 @@ impl Planner {
         self.guard.set_homed(axis, homed);
     }
 
-    /// Makes a source continue from where the machine is: before its first line, and whenever another source moved.
+    /// Makes a source continue from where the machine is: before its first line, and whenever another source moved. Its
+    /// offsets are forgotten.
     pub fn adopt(&mut self, source: &mut Source) {
         let [x, y, z, e] = self.position;
         source.interpreter.set_axes(Some(x), Some(y), Some(z));
-        self.e_offset = e - source.interpreter.position().e;
+        source.e_offset = e - source.interpreter.position().e;
+        self.said = Said::default();
     }
 
-    /// Makes a source that was interrupted go on: the machine is where the source thinks that it is, but for the
-    /// extruder, which may have been moved.
-    pub fn rejoin(&mut self, source: &Source) {
-        self.e_offset = self.position[3] - source.interpreter.position().e;
+    /// Tells a source whose move was refused, or stopped, that the machine stands here. Its offsets hold.
+    pub fn correct(&mut self, source: &mut Source) {
+        let [x, y, z, e] = self.position;
+        source.interpreter.stand_at(x, y, z);
+        source.e_offset = e - source.interpreter.position().e;
+    }
+
+    /// Makes a source that was interrupted go on: the machine is where it was then, but for the extruder, which has been
+    /// moved by this much filament in mm.
+    pub fn rejoin(&mut self, source: &mut Source, filament_mm: f64) {
+        source.e_offset += filament_mm;
+    }
+
+    /// As [`Self::adopt`], for a job, whose plan is to depend on nothing that was done before: the machine file's limits
+    /// hold again, and the filament counts from 0. At rest.
+    pub fn begin_job(&mut self, source: &mut Source) {
+        debug_assert!(self.is_at_rest(), "a job begins at rest");
+        self.position[EXTRUDER] = 0.0;
+        self.limits = self.machine_limits;
+        // They have been checked when the planner was made.
+        let _ = self.look_ahead.set_limits(self.limits);
+        self.adopt(source);
+    }
+
+    /// A move could not be turned into steps, so that the run cannot be brought to rest: everything has to stop.
+    pub const fn is_broken(&self) -> bool {
+        self.is_broken
     }
 
     /// Lets the machine come to rest after the moves that were read; [`Planned::RunEnded`] tells when.
@@ -261,6 +199,16 @@ impl Planner {
     /// Forgets a barrier that has been read and not been reached.
     pub fn drop_barrier(&mut self) {
         self.barrier = None;
+    }
+
+    /// Takes a barrier that has been read and not been reached, to be [put back](Self::put_barrier).
+    pub fn take_barrier(&mut self) -> Option<(LineNumber, Barrier)> {
+        self.barrier.take()
+    }
+
+    /// Puts a barrier back, before anything else is read.
+    pub fn put_barrier(&mut self, barrier: Option<(LineNumber, Barrier)>) {
+        self.barrier = barrier;
     }
 
     /// Drops everything that was planned: the motors have been stopped by something else. The position is where the
@@ -320,8 +268,8 @@ impl Planner {
                 self.finish_run();
                 continue;
             }
-            if let Some(chord) = source.chords.pop_front() {
-                self.judge_and_push(&chord)?;
+            if let Some(chord) = source.next_chord() {
+                self.judge_and_push(&chord, source.e_offset)?;
                 continue;
             }
             match source.next() {
@@ -337,8 +285,8 @@ impl Planner {
     fn act(&mut self, action: Action, source: &mut Source) -> Result<(), PrinterError> {
         let line = source.line();
         match action {
-            Action::Move(mv) => self.judge_and_push(&mv)?,
-            Action::Arc(arc) => source.chords.extend(arc.chords(CHORD_TOLERANCE)),
+            Action::Move(mv) => self.judge_and_push(&mv, source.e_offset)?,
+            Action::Arc(arc) => source.draw(&arc),
             Action::VelocityLimit(limit) => self.limit(limit),
             Action::SetTemperature { heater, target, wait: Wait::No } => {
                 self.defer(line, TimedAction::SetTemperature { heater, target });
@@ -346,6 +294,7 @@ impl Planner {
             Action::SetTemperature { heater, target, wait } => {
                 self.barrier = Some((line, Barrier::WaitTemperature { heater, target, wait }));
             }
+            Action::Fan { index, .. } if index > 0 => self.notice_fan(line),
             Action::Fan { index, speed } => self.defer(line, TimedAction::Fan { index, speed }),
             Action::Message(text) => self.defer(line, TimedAction::Message(text)),
             Action::Annotation(annotation) => self.defer(line, TimedAction::Annotation(annotation)),
@@ -353,7 +302,10 @@ impl Planner {
             Action::ReportTemperatures => self.defer(line, TimedAction::ReportTemperatures),
             Action::ReportPosition => self.defer(line, TimedAction::ReportPosition),
             Action::Home { x, y, z } => self.barrier = Some((line, Barrier::Home([x, y, z]))),
-            Action::Dwell(pause) if self.run == Run::Active => self.look_ahead.dwell(pause),
+            Action::Dwell(pause) if self.run == Run::Active && pause <= DWELL_IN_RUN_MAX => {
+                self.look_ahead.dwell(pause);
+                self.dwelt_until = self.look_ahead.print_time();
+            }
             Action::Dwell(pause) => self.barrier = Some((line, Barrier::Dwell(pause))),
             Action::MotorsOff { x, y, z, e } => self.barrier = Some((line, Barrier::MotorsOff([x, y, z, e]))),
             Action::WaitForMoves => self.barrier = Some((line, Barrier::WaitForMoves)),
@@ -369,10 +321,11 @@ impl Planner {
             Action::TurnOffHeaters => self.defer(line, TimedAction::TurnOffHeaters),
             Action::Cancel => self.barrier = Some((line, Barrier::Cancel)),
             Action::PressureAdvance { .. } => {
-                self.notice(
-                    line,
-                    "pressure advance is not applied by this version: the print is made without it",
-                );
+                if !core::mem::replace(&mut self.said.pressure_advance, true) {
+                    let text =
+                        "pressure advance is not applied by this version: the print is made without it";
+                    self.notice(line, text);
+                }
             }
             // The interpreter has the factors in its moves already; the machine file knows the machine's limits; there
             // is only one tool.
@@ -382,6 +335,12 @@ impl Planner {
             | Action::SelectTool(_) => {}
         }
         Ok(())
+    }
+
+    fn notice_fan(&mut self, line: LineNumber) {
+        if !core::mem::replace(&mut self.said.other_fans, true) {
+            self.notice(line, "the machine file has one fan: orders for others are passed over");
+        }
     }
 
     fn notice(&mut self, line: LineNumber, message: &str) {
@@ -394,7 +353,7 @@ impl Planner {
         }));
     }
 
-    /// A file may ask for less than the machine file allows, never for more.
+    /// A file may ask for less speed and acceleration than the machine file allows, never for more.
     fn limit(&mut self, limit: VelocityLimit) {
         let machine = &self.machine_limits;
         let mut limits = self.limits;
@@ -419,29 +378,60 @@ impl Planner {
     /// Attaches an action to the end of the moves read so far.
     fn defer(&mut self, line: LineNumber, action: TimedAction) {
         if self.moves_planned == self.moves_pushed {
-            let at = if self.run == Run::None { Seconds::ZERO } else { self.planned_until };
+            let until = self.planned_until.max(self.dwelt_until);
+            let at = if self.run == Run::None { Seconds::ZERO } else { until };
             self.ready.push_back(Planned::Timed { at, line, action });
             return;
         }
-        self.deferred.push_back(Deferred { after: self.moves_pushed, line, action });
+        let not_before = self.dwelt_until;
+        self.deferred.push_back(Deferred { after: self.moves_pushed, not_before, line, action });
         if self.deferred.len() >= DEFERRED_MAX {
             self.finish_run();
         }
     }
 
-    fn judge_and_push(&mut self, mv: &Move) -> Result<(), PrinterError> {
-        self.guard.judge(mv)?;
-        self.push([mv.to.x, mv.to.y, mv.to.z, mv.to.e + self.e_offset], mv.feed, mv.line)
+    fn judge_and_push(&mut self, mv: &Move, e_offset: f64) -> Result<(), PrinterError> {
+        let to = [mv.to.x, mv.to.y, mv.to.z, mv.to.e + e_offset];
+        // Judged from where the machine is, not from where the source believes that it is.
+        let [x, y, z, e] = self.position;
+        let from = gcode::Position { x, y, z, e: e - e_offset };
+        self.guard.judge(&Move { from, ..*mv })?;
+        self.push(to, mv.feed, mv.line)
+    }
+
+    /// Refuses what no driver can step, by the highest speed that the limits leave. An extruder that moves along with
+    /// the axes is judged when its steps are made: its junctions slow it down.
+    fn judge_speed(&self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
+        let delta: [f64; MOTORS] = core::array::from_fn(|motor| to[motor] - self.position[motor]);
+        let travel = delta[..3].iter().map(|d| d * d).sum::<f64>().sqrt();
+        let limits = &self.limits;
+        let (length, speed, motors) = if travel > 0.0 {
+            (travel, feed.min(limits.max_velocity), 0..EXTRUDER)
+        } else {
+            let speed = feed.min(limits.extruder.max_extrude_only_velocity);
+            (delta[EXTRUDER].abs(), speed, EXTRUDER..MOTORS)
+        };
+        for motor in motors {
+            let share = delta[motor].abs() / length;
+            let z_bound = if motor == 2 { limits.max_z_velocity } else { speed };
+            if share > 0.0 && z_bound.min(speed * share) > self.motor_speed_max[motor] {
+                let detail = format!("{} at {:.0} mm/s", machine::MOTOR_NAMES[motor], speed.0 * share);
+                return Err(PrinterError::new(ErrorCode::StepRateTooHigh, detail).at_line(line.0));
+            }
+        }
+        Ok(())
     }
 
     fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
         if to == self.position {
             return Ok(());
         }
+        self.judge_speed(to, feed, line)?;
         if self.run == Run::None {
             self.look_ahead.begin_run();
             self.generator.begin_run(self.position).map_err(|error| wrong(&error).at_line(line.0))?;
             self.planned_until = Seconds::ZERO;
+            self.dwelt_until = Seconds::ZERO;
             self.run = Run::Active;
             self.ready.push_back(Planned::RunStarted(self.position));
         }
@@ -455,20 +445,28 @@ impl Planner {
     }
 
     fn take_planned(&mut self, planned: PlannedMove) -> Result<(), PrinterError> {
-        self.generator.push(&planned).map_err(|error| wrong(&error).at_line(planned.tag))?;
+        if let Err(error) = self.generator.push(&planned) {
+            self.is_broken = true;
+            let code = match error {
+                PushError::StepRate { .. } => ErrorCode::StepRateTooHigh,
+                _ => ErrorCode::Internal,
+            };
+            return Err(PrinterError::new(code, error.to_string()).at_line(planned.tag));
+        }
         self.planned_until = Seconds(planned.end_time());
         self.moves_planned += 1;
         self.ready.push_back(Planned::Move(planned));
         while let Some(deferred) = self.deferred.pop_front_if(|deferred| deferred.after <= self.moves_planned)
         {
-            let Deferred { line, action, .. } = deferred;
-            self.ready.push_back(Planned::Timed { at: self.planned_until, line, action });
+            let Deferred { line, action, not_before, .. } = deferred;
+            let at = self.planned_until.max(not_before);
+            self.ready.push_back(Planned::Timed { at, line, action });
         }
         Ok(())
     }
 }
 
-/// A move that cannot be planned: too fast for the board, or too far to be counted.
+/// A move that cannot be planned: without a usable speed, or too far to be counted.
 fn wrong(error: &dyn core::error::Error) -> PrinterError {
     PrinterError::new(ErrorCode::InvalidGcode, error.to_string())
 }

@@ -1,8 +1,8 @@
 //! One stream of G-code with its own modal state: a job's file, or what a user types.
 
-use std::collections::VecDeque;
-
-use gcode::{Action, Diagnostic, Interpreter, LineNumber, Lines, Move, Settings};
+use gcode::{
+    Action, Arc, CHORD_TOLERANCE, Chords, Diagnostic, Interpreter, LineNumber, Lines, Move, Settings,
+};
 
 /// The most bytes a source holds before it says that it wants no more.
 pub const SOURCE_BYTES_MAX: usize = 64 * 1024;
@@ -17,8 +17,10 @@ pub struct Source {
     actions: Vec<Action>,
     next_action: usize,
     diagnostics: Vec<Diagnostic>,
-    /// The chords of an arc that is being drawn.
-    pub(super) chords: VecDeque<Move>,
+    /// The chords of an arc that is being drawn, one at a time: a large arc has tens of thousands.
+    chords: Option<Chords>,
+    /// The toolhead's extruder position less the interpreter's, which counts from its own start, in mm of filament.
+    pub(super) e_offset: f64,
     line: LineNumber,
 }
 
@@ -47,7 +49,8 @@ impl Source {
             actions: Vec::new(),
             next_action: 0,
             diagnostics: Vec::new(),
-            chords: VecDeque::new(),
+            chords: None,
+            e_offset: 0.0,
             line: LineNumber(0),
         }
     }
@@ -60,6 +63,11 @@ impl Source {
     /// Takes the next bytes of the stream.
     pub fn feed(&mut self, bytes: &[u8]) {
         self.lines.feed(bytes);
+    }
+
+    /// Whether everything that was fed has been read.
+    pub fn is_drained(&self) -> bool {
+        self.lines.buffered() == 0 && self.next_action >= self.actions.len() && self.chords.is_none()
     }
 
     /// Says that no more bytes come: a last line without a line break counts.
@@ -79,7 +87,21 @@ impl Source {
         self.actions.clear();
         self.next_action = 0;
         self.diagnostics.clear();
-        self.chords.clear();
+        self.chords = None;
+    }
+
+    /// Begins to draw an arc.
+    pub(super) fn draw(&mut self, arc: &Arc) {
+        self.chords = Some(arc.chords(CHORD_TOLERANCE));
+    }
+
+    /// The next piece of the arc that is being drawn.
+    pub(super) fn next_chord(&mut self) -> Option<Move> {
+        let chord = self.chords.as_mut()?.next();
+        if chord.is_none() {
+            self.chords = None;
+        }
+        chord
     }
 
     /// The next thing in the stream.

@@ -115,3 +115,19 @@ impl Board {
         }
     }
 }
+
+#[cfg(test)]
+impl Board {
+    /// A board that nobody answers for, laid out as a machine file says.
+    pub(super) fn for_tests(config: &crate::config::PrinterConfig) -> Self {
+        let profile = virtual_printer::BoardProfile::rp2040();
+        let dictionary = Dictionary::parse(&profile.description().compressed()).expect("a dictionary");
+        let layout = Layout::new(config, &dictionary, f64::from(profile.clock.0)).expect("a layout");
+        let mut sync = ClockSync::new(profile.clock);
+        sync.uptime(1, units::Clock32(0), Some(Seconds::ZERO), Seconds::ZERO);
+        let mut link = Link::new();
+        link.set_board(profile.clock, 1000);
+        let losses = Losses::default();
+        Self { link, dictionary, sync, clock: profile.clock, adc_max: 4095.0, layout, losses }
+    }
+}

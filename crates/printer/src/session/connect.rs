@@ -3,12 +3,13 @@
 use units::{Hertz, Seconds};
 use wire::{
     Command, Response,
+    block::BLOCK_BYTES_MAX,
     dictionary::{Dictionary, Received},
 };
 
 use super::{
     board::{Board, Losses},
-    event::Event,
+    event::{Event, PhaseName},
     inbox::{self, Message},
     layout::Layout,
 };
@@ -23,9 +24,15 @@ use crate::{
 /// Questions that are not answered are asked again after this long.
 const ASK_AGAIN: Seconds = Seconds(0.25);
 /// A board that was asked to restart gets this long before it is spoken to.
-pub(super) const RESTART: Seconds = Seconds(1.0);
+const RESTART: Seconds = Seconds(1.0);
 /// Converters' full scale where the board does not say.
 const ADC_MAX_DEFAULT: f64 = 4095.0;
+/// Eight readings are added up in 16 bits.
+const ADC_MAX_MAX: f64 = 8191.0;
+/// A board that has not taken its configuration in after this long never will.
+const CONNECT_MAX: Seconds = Seconds(60.0);
+/// With fewer moves in its queue a board cannot be kept supplied.
+const MOVE_COUNT_MIN: u16 = 64;
 
 /// Reading the dictionary.
 #[derive(Debug)]
@@ -34,11 +41,25 @@ pub(super) struct Identifying {
     bootstrap: Dictionary,
     identify: Identify,
     not_before: Seconds,
+    /// It has been spoken to.
+    has_begun: bool,
 }
 
 impl Identifying {
-    pub(super) fn new(not_before: Seconds) -> Self {
-        Self { link: Link::new(), bootstrap: Dictionary::bootstrap(), identify: Identify::new(), not_before }
+    /// A board on a port that has just been opened.
+    pub(super) fn new(now: Seconds) -> Self {
+        Self {
+            link: Link::new(),
+            bootstrap: Dictionary::bootstrap(),
+            identify: Identify::new(),
+            not_before: now,
+            has_begun: true,
+        }
+    }
+
+    /// A board that has been asked to restart.
+    pub(super) fn after_restart(now: Seconds) -> Self {
+        Self { not_before: now + RESTART, has_begun: false, ..Self::new(now) }
     }
 
     pub(super) fn receive(&mut self, bytes: &[u8], now: Seconds) -> Result<Option<Dictionary>, PrinterError> {
@@ -63,6 +84,7 @@ impl Identifying {
         if now < self.not_before {
             return Ok(self.not_before);
         }
+        self.has_begun = true;
         if let Some(request) = self.identify.poll(now).map_err(|error| identify_error(&error))? {
             let command = Command::Identify { offset: request.offset, count: request.count };
             if let Ok(message) = Outgoing::command(Lane::Control, &self.bootstrap, &command) {
@@ -72,6 +94,10 @@ impl Identifying {
         let wake = self.link.poll(now, units::Ticks(0), out);
         let ask = self.identify.next_wake().unwrap_or(now);
         Ok(wake.map_or(ask, |wake| wake.min(ask)))
+    }
+
+    pub(super) const fn phase(&self) -> PhaseName {
+        if self.has_begun { PhaseName::Identifying } else { PhaseName::Restarting }
     }
 
     pub(super) fn into_link(self) -> Link {
@@ -114,6 +140,7 @@ pub(super) struct Connecting {
     pub(super) board: Board,
     step: Step,
     asked: Option<Seconds>,
+    began: Option<Seconds>,
     config: Option<Message>,
 }
 
@@ -129,6 +156,14 @@ impl Connecting {
         if !(1000.0..=1e9).contains(&clock_freq) {
             return Err(wrong("the board's CLOCK_FREQ makes no sense"));
         }
+        let adc_max = dictionary.number("ADC_MAX").unwrap_or(ADC_MAX_DEFAULT);
+        if !(1.0..=ADC_MAX_MAX).contains(&adc_max) {
+            return Err(wrong("the board's ADC_MAX makes no sense"));
+        }
+        let window = dictionary.number("RECEIVE_WINDOW");
+        if window.is_some_and(|bytes| !(BLOCK_BYTES_MAX as f64..=1e6).contains(&bytes)) {
+            return Err(wrong("the board's RECEIVE_WINDOW makes no sense"));
+        }
         let layout = Layout::new(config, &dictionary, clock_freq)?;
         let clock = Hertz(clock_freq as u32);
         let event = Event::Identified {
@@ -140,15 +175,22 @@ impl Connecting {
             link,
             sync: ClockSync::new(clock),
             clock,
-            adc_max: dictionary.number("ADC_MAX").unwrap_or(ADC_MAX_DEFAULT),
+            adc_max,
             dictionary,
             layout,
             losses: Losses::default(),
         };
-        if let Some(window) = board.dictionary.number("RECEIVE_WINDOW") {
+        if let Some(window) = window {
             board.link.set_receive_window(window as usize);
         }
-        Ok((Self { board, step: Step::State, asked: None, config: None }, event))
+        Ok((Self { board, step: Step::State, asked: None, began: None, config: None }, event))
+    }
+
+    pub(super) const fn phase(&self) -> PhaseName {
+        match self.step {
+            Step::State => PhaseName::Synchronising,
+            Step::Sent => PhaseName::Configuring,
+        }
     }
 
     pub(super) fn receive(&mut self, bytes: &[u8], now: Seconds) {
@@ -165,6 +207,9 @@ impl Connecting {
     pub(super) fn poll(&mut self, now: Seconds, out: &mut Vec<u8>) -> Result<Outcome, PrinterError> {
         if self.board.sync.is_silent(now) {
             return Err(ErrorCode::BoardSilent.into());
+        }
+        if now - *self.began.get_or_insert(now) > CONNECT_MAX {
+            return Err(PrinterError::new(ErrorCode::WrongFirmware, "it does not take its configuration in"));
         }
         ask_clock(&mut self.board, now);
         match self.config.take() {
@@ -208,6 +253,10 @@ impl Connecting {
                 self.board.control(&Command::FinalizeConfig { crc });
                 self.step = Step::Sent;
                 Ok(None)
+            }
+            Step::Sent if is_config && move_count < MOVE_COUNT_MIN => {
+                let detail = format!("it has room for {move_count} moves, {MOVE_COUNT_MIN} are needed");
+                Err(PrinterError::new(ErrorCode::BoardTooSmall, detail))
             }
             Step::Sent if is_config && crc == self.board.layout.crc => {
                 let clock = self.board.clock;

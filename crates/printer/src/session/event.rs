@@ -1,12 +1,59 @@
 //! What a session tells its owner, and what the owner asks of it.
 
+use std::collections::VecDeque;
+
 use gcode::{Annotation, Diagnostic, Heater, ObjectAction};
 use units::{Celsius, Seconds, Ticks};
 
 use crate::{error::PrinterError, planner::Position};
 
-/// The most events that wait for their owner: the oldest are dropped beyond that, and the owner is told how many.
+/// The most events that wait for their owner. Beyond that the oldest of those that come in masses (readings, moves,
+/// progress, comments) are dropped first, and the owner is told how many.
 pub const EVENTS_MAX: usize = 16_384;
+
+/// Events that wait for their owner.
+#[derive(Debug, Default)]
+pub(super) struct Events {
+    queue: VecDeque<Event>,
+    dropped: u64,
+}
+
+impl Events {
+    pub(super) fn push(&mut self, event: Event) {
+        if self.queue.len() >= EVENTS_MAX {
+            self.make_room();
+        }
+        self.queue.push_back(event);
+    }
+
+    /// Takes over what another queue holds.
+    pub(super) fn append(&mut self, other: &mut Self) {
+        self.dropped += core::mem::take(&mut other.dropped);
+        other.queue.drain(..).for_each(|event| self.push(event));
+    }
+
+    /// Hands everything out.
+    pub(super) fn take(&mut self) -> VecDeque<Event> {
+        if self.dropped > 0 {
+            self.queue.push_front(Event::Dropped(core::mem::take(&mut self.dropped)));
+        }
+        core::mem::take(&mut self.queue)
+    }
+
+    /// Frees at least a quarter, so that what it costs is shared by many.
+    fn make_room(&mut self) {
+        let before = self.queue.len();
+        let mut surplus = before / 2;
+        self.queue.retain(|event| {
+            let goes = surplus > 0 && event.is_one_of_many();
+            surplus -= usize::from(goes);
+            !goes
+        });
+        let excess = self.queue.len().saturating_sub(EVENTS_MAX / 4 * 3);
+        self.queue.drain(..excess);
+        self.dropped += (before - self.queue.len()) as u64;
+    }
+}
 
 /// What happened.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,6 +132,20 @@ pub enum Event {
     Dropped(u64),
 }
 
+impl Event {
+    /// Whether there are many of its kind, each of little weight.
+    const fn is_one_of_many(&self) -> bool {
+        matches!(
+            self,
+            Self::Temperature { .. }
+                | Self::Move(_)
+                | Self::Progress { .. }
+                | Self::Annotation(_)
+                | Self::Object(_)
+        )
+    }
+}
+
 /// A planned move on the board's clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduledMove {
@@ -134,14 +195,44 @@ pub enum Request {
     SetSpeedFactor(f64),
     /// The extrusion factor of everything that is planned from now on.
     SetFlowFactor(f64),
-    /// The job comes to rest and waits.
+    /// The job comes to rest and waits; a wait for a temperature is broken off and taken up again afterwards.
     Pause,
     /// The job goes on from where it paused.
     Resume,
-    /// The job comes to rest and ends; heaters and fan go off.
+    /// The job comes to rest and ends; heaters and fan go off. Without a job, what was typed is.
     Cancel,
     /// Everything stops at once.
     EmergencyStop,
     /// The board starts anew, after a shutdown or because the user wants it.
     FirmwareRestart,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn events_that_nobody_takes_stay_bounded_and_rare_ones_survive() {
+        let mut events = Events::default();
+        events.push(Event::JobDone);
+        let progress = |line| Event::Progress { line, elapsed: Seconds::ZERO };
+        for line in 0..100_000 {
+            events.push(progress(line));
+        }
+        let mut taken = events.take();
+        assert!(taken.len() <= EVENTS_MAX + 1);
+        let Some(Event::Dropped(dropped)) = taken.pop_front() else { panic!() };
+        assert_eq!(dropped as usize + taken.len(), 100_001);
+        assert_eq!((taken.front(), taken.back()), (Some(&Event::JobDone), Some(&progress(99_999))));
+        assert!(events.take().is_empty());
+    }
+
+    #[test]
+    fn even_rare_ones_are_bounded() {
+        let mut events = Events::default();
+        (0..50_000).for_each(|n| events.push(Event::Message(n.to_string())));
+        let taken = events.take();
+        assert!(taken.len() <= EVENTS_MAX + 1);
+        assert_eq!(taken.back(), Some(&Event::Message("49999".into())));
+    }
 }

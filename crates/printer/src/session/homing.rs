@@ -60,6 +60,8 @@ pub(super) enum Wish {
     Abandon,
     /// The axis is home.
     Done,
+    /// The axis stands still because it was told to; where, nobody knows.
+    Cancelled,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,6 +72,7 @@ enum Stage {
     Plan,
     /// On the way; `end` is when the move would end without an endstop.
     Approach {
+        start: Ticks,
         end: Option<Ticks>,
         kept_alive: Seconds,
         heard: Seconds,
@@ -93,6 +96,7 @@ pub(super) struct AxisHoming {
     stepper: u8,
     stage: Stage,
     second: bool,
+    cancelled: bool,
     /// When the question of the present stage was first and last asked.
     asked: Option<(Seconds, Seconds)>,
     position_before: i32,
@@ -116,6 +120,7 @@ impl AxisHoming {
             stepper: board.layout.steppers[axis]?.stepper.0,
             stage: Stage::PositionBefore,
             second: false,
+            cancelled: false,
             asked: None,
             position_before: 0,
             abandon: false,
@@ -132,6 +137,12 @@ impl AxisHoming {
     /// Where the axis is once it is home, in mm.
     pub(super) const fn position_mm(&self) -> f64 {
         self.endstop_mm
+    }
+
+    /// The axis is to stop.
+    pub(super) fn cancel(&mut self) {
+        self.cancelled = true;
+        self.asked = None;
     }
 
     fn enter(&mut self, stage: Stage) {
@@ -167,6 +178,9 @@ impl AxisHoming {
         if core::mem::take(&mut self.abandon) {
             return Ok(Wish::Abandon);
         }
+        if self.cancelled && self.stands(at_rest) {
+            return Ok(Wish::Cancelled);
+        }
         match self.stage {
             Stage::PositionBefore | Stage::PositionAfter => {
                 self.ask(&Command::StepperGetPosition { oid: self.stepper }, board, now)?;
@@ -195,6 +209,16 @@ impl AxisHoming {
                 Ok(Wish::Wait)
             }
             Stage::Done => Ok(Wish::Done),
+        }
+    }
+
+    /// Whether nothing moves and nothing is about to.
+    fn stands(&self, at_rest: bool) -> bool {
+        match self.stage {
+            Stage::PositionBefore | Stage::PositionAfter | Stage::Released => true,
+            // Its move may be on the way to the stream.
+            Stage::Plan | Stage::PlanRetract | Stage::Retract => at_rest,
+            Stage::Approach { .. } | Stage::Done => false,
         }
     }
 
@@ -228,7 +252,7 @@ impl AxisHoming {
             trsync_oid: trsync,
             trigger_reason: REASON_ENDSTOP,
         });
-        self.enter(Stage::Approach { end: None, kept_alive: now, heard: now });
+        self.enter(Stage::Approach { start, end: None, kept_alive: now, heard: now });
     }
 
     /// The approach has been planned to its end.
@@ -239,7 +263,9 @@ impl AxisHoming {
     }
 
     fn watch(&mut self, board: &mut Board, now: Seconds) -> Result<Wish, PrinterError> {
-        let Stage::Approach { end, kept_alive, heard } = &mut self.stage else { return Ok(Wish::Wait) };
+        let Stage::Approach { start, end, kept_alive, heard } = &mut self.stage else {
+            return Ok(Wish::Wait);
+        };
         let clock_now = board.clock_at(now);
         if now - *kept_alive >= KEEP_ALIVE {
             *kept_alive = now;
@@ -248,6 +274,9 @@ impl AxisHoming {
         }
         let overdue = end.is_some_and(|end| clock_now > end + board.ticks(REPORT));
         let silent = now - *heard > REPORT_SILENCE;
+        // Not before the steps have begun: a stepper that is stopped first would start with them all the same.
+        let stop_wanted = self.cancelled && clock_now > *start + board.ticks(REPORT);
+        let overdue = overdue || stop_wanted;
         if overdue || silent {
             // Answered with the reason that it fired for first, should it have fired already.
             let stop = Command::TrsyncTrigger { oid: self.oids.trsync.0, reason: REASON_HOST };
@@ -276,11 +305,15 @@ impl AxisHoming {
         }
         if can_trigger {
             *heard = now;
-            self.asked = None;
+            self.asked = self.asked.filter(|_| self.cancelled);
             return Ok(());
         }
         match reason {
             REASON_ENDSTOP => {
+                self.stopped(board);
+                Ok(())
+            }
+            _ if self.cancelled => {
                 self.stopped(board);
                 Ok(())
             }
@@ -349,9 +382,9 @@ impl AxisHoming {
     }
 
     /// The board reports where a motor stands.
-    pub(super) fn on_position(&mut self, oid: u8, position: i32) {
+    pub(super) fn on_position(&mut self, oid: u8, position: i32) -> Result<(), PrinterError> {
         if oid != self.stepper {
-            return;
+            return Ok(());
         }
         match self.stage {
             Stage::PositionBefore => {
@@ -359,11 +392,20 @@ impl AxisHoming {
                 self.enter(Stage::Plan);
             }
             Stage::PositionAfter => {
-                self.steps += u64::from(position.wrapping_sub(self.position_before).unsigned_abs());
+                let made = position.wrapping_sub(self.position_before).unsigned_abs();
+                self.steps += u64::from(made);
+                if self.second && made == 0 {
+                    // It was open after backing off: closed without a step it is no switch at the axis' end.
+                    return Err(self.fail(ErrorCode::EndstopBeforeMove, "on its second approach"));
+                }
                 let again = !self.second && self.retract_mm > 0.0;
                 self.enter(if again { Stage::PlanRetract } else { Stage::Done });
             }
             _ => {}
         }
+        Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

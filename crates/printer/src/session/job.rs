@@ -52,15 +52,27 @@ pub enum JobStatus {
     Ending,
 }
 
+/// How the machine stood when a job was paused.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Paused {
+    pub(super) position: Position,
+    pub(super) homed: [bool; 3],
+    /// The nozzle was hot enough.
+    pub(super) could_extrude: bool,
+}
+
 /// A print.
 #[derive(Debug)]
 pub(super) struct Job {
     pub(super) source: Source,
     pub(super) options: JobOptions,
     pub(super) state: JobState,
-    /// Where it was paused.
-    pub(super) paused_at: Option<Position>,
+    pub(super) paused: Option<Paused>,
     pub(super) told: Seconds,
+    /// It has made a move.
+    pub(super) has_moved: bool,
+    /// It switched the nozzle on and not off again.
+    pub(super) leaves_hot: bool,
 }
 
 impl Job {
@@ -69,8 +81,10 @@ impl Job {
             source: Source::new(settings),
             options,
             state: JobState::Printing,
-            paused_at: None,
+            paused: None,
             told: Seconds(f64::NEG_INFINITY),
+            has_moved: false,
+            leaves_hot: false,
         }
     }
 
@@ -81,6 +95,16 @@ impl Job {
             JobState::Paused => JobStatus::Paused,
             JobState::Cancelling | JobState::Failing(_) => JobStatus::Ending,
         }
+    }
+
+    /// Whether its G-code is what is carried out.
+    pub(super) fn is_active(&self) -> bool {
+        self.state != JobState::Paused
+    }
+
+    /// Whether it is over as soon as the machine is at rest.
+    pub(super) const fn is_ending(&self) -> bool {
+        matches!(self.state, JobState::Cancelling | JobState::Failing(_))
     }
 
     /// Whether a blocking line has been confirmed.

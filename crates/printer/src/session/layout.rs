@@ -165,7 +165,8 @@ impl Builder<'_> {
         let (endstop, trsync) = (self.oid(), self.oid());
         let pull_up = match pin.pull {
             Pull::Up => 1,
-            Pull::None | Pull::Down => 0,
+            Pull::None => 0,
+            Pull::Down => -1,
         };
         self.commands.push(Command::ConfigEndstop { oid: endstop.0, pin: number, pull_up });
         self.commands.push(Command::ConfigTrsync { oid: trsync.0 });
@@ -230,5 +231,86 @@ impl Layout {
         }
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes);
         Ok(Self { steppers, endstops, extruder, bed, fan, commands, crc })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use virtual_printer::BoardProfile;
+
+    fn lay_out(text: &str) -> Result<Layout, PrinterError> {
+        let config = crate::config::parse(text).0.expect("a machine");
+        let board = BoardProfile::rp2040();
+        let dictionary = Dictionary::parse(&board.description().compressed()).expect("a dictionary");
+        Layout::new(&config, &dictionary, f64::from(board.clock.0))
+    }
+
+    const SAMPLE: &str = include_str!("../../../../samples/printer.cfg");
+
+    #[test]
+    fn the_sample_machine_is_laid_out_as_its_file_says() {
+        let layout = lay_out(SAMPLE).unwrap();
+        let text: Vec<String> = layout.commands.iter().map(|command| format!("{command:?}")).collect();
+        let expected = [
+            "AllocateOids { count: 19 }",
+            "ConfigEndstop { oid: 0, pin: 20, pull_up: 1 }",
+            "ConfigTrsync { oid: 1 }",
+            "ConfigEndstop { oid: 2, pin: 21, pull_up: 1 }",
+            "ConfigTrsync { oid: 3 }",
+            "ConfigEndstop { oid: 4, pin: 22, pull_up: 1 }",
+            "ConfigTrsync { oid: 5 }",
+            "ConfigStepper { oid: 6, step_pin: 0, dir_pin: 1, invert_step: 0, step_pulse_ticks: 24 }",
+            "ConfigDigitalOut { oid: 7, pin: 2, value: 1, default_value: 1, max_duration: 0 }",
+            "ConfigStepper { oid: 8, step_pin: 3, dir_pin: 4, invert_step: 0, step_pulse_ticks: 24 }",
+            "ConfigDigitalOut { oid: 9, pin: 5, value: 1, default_value: 1, max_duration: 0 }",
+            "ConfigStepper { oid: 10, step_pin: 6, dir_pin: 7, invert_step: 0, step_pulse_ticks: 24 }",
+            "ConfigDigitalOut { oid: 11, pin: 8, value: 1, default_value: 1, max_duration: 0 }",
+            "ConfigStepper { oid: 12, step_pin: 9, dir_pin: 10, invert_step: 0, step_pulse_ticks: 24 }",
+            "ConfigDigitalOut { oid: 13, pin: 11, value: 1, default_value: 1, max_duration: 0 }",
+            "ConfigAnalogIn { oid: 14, pin: 26 }",
+            "ConfigDigitalOut { oid: 15, pin: 16, value: 0, default_value: 0, max_duration: 36000000 }",
+            "SetDigitalOutPwmCycle { oid: 15, cycle_ticks: 1200000 }",
+            "ConfigAnalogIn { oid: 16, pin: 27 }",
+            "ConfigDigitalOut { oid: 17, pin: 17, value: 0, default_value: 0, max_duration: 36000000 }",
+            "SetDigitalOutPwmCycle { oid: 17, cycle_ticks: 1200000 }",
+            "ConfigDigitalOut { oid: 18, pin: 18, value: 0, default_value: 0, max_duration: 0 }",
+            "SetDigitalOutPwmCycle { oid: 18, cycle_ticks: 120000 }",
+        ];
+        assert_eq!(text, expected, "{text:#?}");
+        assert!(layout.steppers[1].is_some_and(|oids| oids.invert_dir));
+    }
+
+    #[test]
+    fn every_heater_is_watched_by_the_board_and_off_by_default() {
+        let layout = lay_out(&SAMPLE.replace("heater_pin: gpio16", "heater_pin: !gpio16")).unwrap();
+        for heater in [layout.extruder.unwrap(), layout.bed.unwrap()] {
+            let found = layout.commands.iter().find_map(|command| match *command {
+                Command::ConfigDigitalOut { oid, value, default_value, max_duration, .. }
+                    if oid == heater.power.oid.0 =>
+                {
+                    Some((value, default_value, max_duration))
+                }
+                _ => None,
+            });
+            let off = u8::from(heater.power.inverted);
+            assert_eq!(found, Some((off, off, 36_000_000)));
+            assert_eq!(heater.power.on_ticks(0.0), u32::from(off) * heater.power.cycle_ticks);
+            assert_eq!(heater.power.on_ticks(f64::NAN), heater.power.on_ticks(0.0));
+        }
+    }
+
+    #[test]
+    fn another_machine_file_has_another_number() {
+        let crc = lay_out(SAMPLE).unwrap().crc;
+        assert_ne!(crc, lay_out(&SAMPLE.replace("gpio18", "gpio19")).unwrap().crc);
+        assert_eq!(crc, lay_out(&SAMPLE.replace("max_accel: 3000", "max_accel: 2000")).unwrap().crc);
+    }
+
+    #[test]
+    fn a_pin_that_the_board_lacks_is_named() {
+        let error = lay_out(&SAMPLE.replace("gpio18", "PA8")).unwrap_err();
+        assert_eq!(error.code, ErrorCode::PinUnknown);
+        assert!(error.detail.contains("PA8") && error.detail.contains("rp2040"));
     }
 }

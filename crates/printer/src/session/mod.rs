@@ -10,6 +10,7 @@
 mod board;
 mod connect;
 mod event;
+mod fan;
 mod homing;
 mod inbox;
 mod job;
@@ -29,14 +30,21 @@ pub use job::{JobOptions, JobStatus};
 
 use self::{
     board::Board,
-    connect::{Connecting, Identifying, Outcome, RESTART},
+    connect::{Connecting, Identifying, Outcome},
+    event::Events,
     inbox::Message,
     ready::{Failure, Ready},
 };
-use crate::{config::PrinterConfig, error::PrinterError, link::LinkStats};
+use crate::{
+    config::PrinterConfig,
+    error::{Ended, ErrorCode, PrinterError},
+    link::LinkStats,
+};
 
 /// With nothing to do, the owner is asked to come back after this long.
 const IDLE_WAKE: Seconds = Seconds(1.0);
+/// A restart that had no effect is tried this often in all: its one message may be lost on a bad line.
+const RESTARTS_MAX: u32 = 5;
 /// The longest text that may be typed at once, in bytes.
 pub const CONSOLE_BYTES_MAX: usize = 16 * 1024;
 
@@ -55,9 +63,14 @@ enum Stage {
 pub struct Session {
     config: PrinterConfig,
     stage: Stage,
-    events: VecDeque<Event>,
-    dropped: u64,
+    events: Events,
+    /// The phase that the owner has been told of.
+    told: PhaseName,
     error: Option<PrinterError>,
+    /// How often a restart of the board may still be tried before it counts as failed …
+    restarts_left: u32,
+    /// … and whether its owner asked for one, which also ends a shutdown.
+    restart_wanted: bool,
     /// Bytes that are still to be sent to a board that restarts.
     parting: Vec<u8>,
 }
@@ -66,15 +79,25 @@ impl Session {
     /// A session on a port that has just been opened.
     pub fn new(config: PrinterConfig, now: Seconds) -> Self {
         let stage = Stage::Identifying(Box::new(Identifying::new(now)));
-        let events = VecDeque::from([Event::Phase(PhaseName::Identifying)]);
-        Self { config, stage, events, dropped: 0, error: None, parting: Vec::new() }
+        let mut events = Events::default();
+        events.push(Event::Phase(PhaseName::Identifying));
+        Self {
+            config,
+            stage,
+            events,
+            told: PhaseName::Identifying,
+            error: None,
+            restarts_left: RESTARTS_MAX,
+            restart_wanted: false,
+            parting: Vec::new(),
+        }
     }
 
     /// How far the connection is.
-    pub const fn phase(&self) -> PhaseName {
-        match self.stage {
-            Stage::Identifying(_) => PhaseName::Identifying,
-            Stage::Connecting(_) => PhaseName::Configuring,
+    pub fn phase(&self) -> PhaseName {
+        match &self.stage {
+            Stage::Identifying(identifying) => identifying.phase(),
+            Stage::Connecting(connecting) => connecting.phase(),
             Stage::Ready(_) => PhaseName::Ready,
             Stage::Shutdown(_) => PhaseName::Shutdown,
             Stage::Failed => PhaseName::Failed,
@@ -89,31 +112,33 @@ impl Session {
     /// What happened since this was last asked.
     pub fn take_events(&mut self) -> VecDeque<Event> {
         self.collect_events();
-        if self.dropped > 0 {
-            self.events.push_back(Event::Dropped(core::mem::take(&mut self.dropped)));
+        self.tell_phase();
+        self.events.take()
+    }
+
+    fn tell_phase(&mut self) {
+        let phase = self.phase();
+        if phase != self.told {
+            self.told = phase;
+            self.events.push(Event::Phase(phase));
         }
-        core::mem::take(&mut self.events)
     }
 
     fn collect_events(&mut self) {
         if let Stage::Ready(ready) = &mut self.stage {
             self.events.append(&mut ready.events);
         }
-        while self.events.len() > EVENTS_MAX {
-            self.events.pop_front();
-            self.dropped += 1;
-        }
     }
 
     fn enter(&mut self, stage: Stage) {
         self.collect_events();
         self.stage = stage;
-        self.events.push_back(Event::Phase(self.phase()));
+        self.tell_phase();
     }
 
     fn fail(&mut self, error: PrinterError) {
         self.enter(Stage::Failed);
-        self.events.push_back(Event::Error(error.clone()));
+        self.events.push(Event::Error(error.clone()));
         self.error = Some(error);
     }
 
@@ -121,7 +146,7 @@ impl Session {
     fn stopped(&mut self, mut board: Board, error: PrinterError) {
         board.link.forget_all();
         self.enter(Stage::Shutdown(Box::new(board)));
-        self.events.push_back(Event::Error(error.clone()));
+        self.events.push(Event::Error(error.clone()));
         self.error = Some(error);
     }
 
@@ -140,7 +165,7 @@ impl Session {
                     match Connecting::new(identifying.into_link(), dictionary, &self.config) {
                         Ok((connecting, identified)) => {
                             self.enter(Stage::Connecting(Box::new(connecting)));
-                            self.events.push_back(identified);
+                            self.events.push(identified);
                         }
                         Err(error) => self.fail(error),
                     }
@@ -150,7 +175,7 @@ impl Session {
             Stage::Connecting(connecting) => connecting.receive(bytes, now),
             Stage::Ready(ready) => {
                 if let Err(failure) = ready.receive(bytes, now) {
-                    self.on_failure(failure);
+                    self.on_failure(failure, now);
                 }
             }
             Stage::Shutdown(board) => {
@@ -166,7 +191,7 @@ impl Session {
         }
     }
 
-    fn on_failure(&mut self, failure: Failure) {
+    fn on_failure(&mut self, failure: Failure, now: Seconds) {
         let Stage::Ready(mut ready) = self.take_stage() else { return };
         self.events.append(&mut ready.events);
         match failure {
@@ -174,10 +199,17 @@ impl Session {
                 let mut board = ready.board;
                 board.link.forget_all();
                 board.immediate(&Command::EmergencyStop {});
-                self.stopped(board, error);
+                self.stopped(board, error.ending(Ended::Everything));
             }
             Failure::Shutdown(error) => self.stopped(ready.board, error),
-            Failure::Lost(error) => self.fail(error),
+            Failure::Lost(error) => {
+                if error.code == ErrorCode::LinkLost {
+                    // Perhaps only the way back is cut.
+                    let mut board = ready.board;
+                    self.part(&mut board, &Command::EmergencyStop {}, now);
+                }
+                self.fail(error);
+            }
         }
     }
 
@@ -206,7 +238,7 @@ impl Session {
             Stage::Ready(ready) => match ready.poll(now, out) {
                 Ok(wake) => wake,
                 Err(failure) => {
-                    self.on_failure(failure);
+                    self.on_failure(failure, now);
                     now
                 }
             },
@@ -225,13 +257,19 @@ impl Session {
         match *outcome {
             Outcome::Pending(_) => {}
             Outcome::Ready => match Ready::new(self.config.clone(), board, now) {
-                Ok(ready) => self.enter(Stage::Ready(Box::new(ready))),
+                Ok(ready) => {
+                    self.restarts_left = RESTARTS_MAX;
+                    self.restart_wanted = false;
+                    self.enter(Stage::Ready(Box::new(ready)));
+                }
                 Err(error) => self.fail(error),
             },
-            Outcome::NeedsRestart => {
-                self.stage = Stage::Shutdown(Box::new(board));
-                self.restart(now);
+            Outcome::NeedsRestart | Outcome::Shutdown(_) if self.restarts_left == 0 => {
+                let detail = "the board was asked to restart and did not";
+                self.fail(PrinterError::new(ErrorCode::ConfigMismatch, detail));
             }
+            Outcome::NeedsRestart => self.restart(Some(board), now),
+            Outcome::Shutdown(_) if self.restart_wanted => self.restart(Some(board), now),
             Outcome::Shutdown(reason) => {
                 let text = board.dictionary.enumeration_name("static_string_id", i64::from(reason));
                 let error = PrinterError::from_shutdown_text(text.unwrap_or("unknown reason"));
@@ -240,22 +278,40 @@ impl Session {
         }
     }
 
-    /// Has the board start anew, and reads it from scratch.
-    fn restart(&mut self, now: Seconds) {
+    /// The owner wants the board to start anew.
+    fn restart_wanted(&mut self, now: Seconds) {
         let board = match self.take_stage() {
-            Stage::Ready(ready) => Some(ready.board),
+            Stage::Ready(ready) => {
+                if ready.job.is_some() {
+                    self.events.push(Event::JobCancelled);
+                }
+                Some(ready.board)
+            }
             Stage::Shutdown(board) => Some(*board),
             Stage::Connecting(connecting) => Some(connecting.board),
             Stage::Identifying(_) | Stage::Failed => None,
         };
+        self.restarts_left = RESTARTS_MAX;
+        self.restart_wanted = true;
+        self.restart(board, now);
+    }
+
+    /// Has the board start anew, and reads it from scratch.
+    fn restart(&mut self, board: Option<Board>, now: Seconds) {
         if let Some(mut board) = board {
-            board.link.forget_all();
-            board.immediate(&Command::Reset {});
-            let clock_now = board.clock_at(now);
-            board.link.poll(now, clock_now, &mut self.parting);
+            self.restarts_left = self.restarts_left.saturating_sub(1);
+            self.part(&mut board, &Command::Reset {}, now);
         }
         self.error = None;
-        self.enter(Stage::Identifying(Box::new(Identifying::new(now + RESTART))));
+        self.enter(Stage::Identifying(Box::new(Identifying::after_restart(now))));
+    }
+
+    /// A last command to a board that is then no longer listened to.
+    fn part(&mut self, board: &mut Board, command: &Command<'_>, now: Seconds) {
+        board.link.forget_all();
+        board.immediate(command);
+        let clock_now = board.clock_at(now);
+        board.link.poll(now, clock_now, &mut self.parting);
     }
 
     /// Counts of the link.

@@ -5,12 +5,12 @@ use wire::Command;
 
 use super::{
     CONSOLE_BYTES_MAX, Session, Stage,
-    event::{Event, Request},
-    job::{Job, JobOptions, JobState, JobStatus, RETURN_FEED},
+    event::Request,
+    job::{Job, JobOptions, JobState, JobStatus},
     ready::{Failure, Ready},
 };
 use crate::{
-    error::{ErrorCode, PrinterError},
+    error::{Ended, ErrorCode, PrinterError},
     machine,
     planner::Position,
 };
@@ -19,19 +19,17 @@ impl Session {
     /// Asks for something. What it leads to comes as events; an error means that nothing was done.
     pub fn request(&mut self, request: Request, now: Seconds) -> Result<(), PrinterError> {
         match request {
-            Request::EmergencyStop => {
-                self.emergency_stop();
-                return Ok(());
-            }
+            Request::EmergencyStop => return self.emergency_stop(now),
+            Request::Gcode(text) if is_emergency(&text) => return self.emergency_stop(now),
             Request::FirmwareRestart => {
-                self.restart(now);
+                self.restart_wanted(now);
                 return Ok(());
             }
             _ => {}
         }
         let Stage::Ready(ready) = &mut self.stage else { return Err(ErrorCode::NotConnected.into()) };
+        ready.last_active = now;
         match request {
-            Request::Gcode(text) if is_emergency(&text) => self.emergency_stop(),
             Request::Gcode(text) => ready.type_gcode(&text)?,
             Request::SetTemperature(heater, target) => {
                 ready.thermal.set_target(heater, target, &mut ready.board, now)?;
@@ -43,38 +41,54 @@ impl Session {
             Request::SetFlowFactor(factor) => {
                 ready.sources().for_each(|source| source.interpreter.set_flow_factor(factor));
             }
-            Request::Pause => ready.pause(),
-            Request::Resume => ready.resume()?,
-            Request::Cancel => ready.cancel(now),
+            Request::Pause => ready.pause(now)?,
+            Request::Resume => ready.resume(now)?,
+            Request::Cancel => ready.cancel(now)?,
             Request::EmergencyStop | Request::FirmwareRestart => {}
         }
         Ok(())
     }
 
-    /// Everything stops, whatever the session is doing.
-    fn emergency_stop(&mut self) {
+    /// Everything stops, whatever the session is doing. Refused where no board is known that could be told.
+    fn emergency_stop(&mut self, now: Seconds) -> Result<(), PrinterError> {
         let error = PrinterError::from(ErrorCode::EmergencyStop);
-        match &self.stage {
-            Stage::Ready(_) => self.on_failure(Failure::Stop(error)),
-            Stage::Connecting(_) => {
-                let Stage::Connecting(connecting) = self.take_stage() else { return };
+        match self.take_stage() {
+            Stage::Ready(ready) => {
+                self.stage = Stage::Ready(ready);
+                self.on_failure(Failure::Stop(error), now);
+            }
+            Stage::Connecting(connecting) => {
                 let mut board = connecting.board;
+                board.link.forget_all();
                 board.immediate(&Command::EmergencyStop {});
                 self.stopped(board, error);
             }
-            Stage::Shutdown(_) | Stage::Identifying(_) | Stage::Failed => {}
+            // It has stopped, but who presses that button does not trust it.
+            Stage::Shutdown(mut board) => {
+                board.immediate(&Command::EmergencyStop {});
+                self.stage = Stage::Shutdown(board);
+            }
+            stage @ (Stage::Identifying(_) | Stage::Failed) => {
+                self.stage = stage;
+                return Err(ErrorCode::NotConnected.into());
+            }
         }
+        Ok(())
     }
 
     /// Starts a job; its file is then fed in pieces. The file should have been checked before
     /// ([`crate::check`]): what blocks it only shows here when the print gets to it.
     pub fn start_job(&mut self, options: JobOptions, now: Seconds) -> Result<(), PrinterError> {
         let Stage::Ready(ready) = &mut self.stage else { return Err(ErrorCode::NotConnected.into()) };
-        if ready.job.is_some() || !ready.is_at_rest() {
+        if ready.job.is_some() {
             return Err(ErrorCode::BusyPrinting.into());
         }
+        if ready.is_console_busy() {
+            return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
+        }
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
-        ready.planner.adopt(&mut job.source);
+        ready.planner.begin_job(&mut job.source);
+        ready.last_active = now;
         ready.stream.reset_elapsed();
         job.told = now;
         ready.job = Some(job);
@@ -89,12 +103,19 @@ impl Session {
         }
     }
 
-    /// The next bytes of the job's file.
+    /// The next bytes of the job's file, no more than [`Self::job_wants`]: more than that ends the job, since they would
+    /// have to be dropped or kept without bound.
     pub fn job_feed(&mut self, bytes: &[u8]) {
         if let Stage::Ready(ready) = &mut self.stage
             && let Some(job) = &mut ready.job
         {
-            job.source.feed(bytes);
+            if bytes.len() <= job.source.wants() {
+                job.source.feed(bytes);
+            } else if !job.is_ending() {
+                let detail = "more of the file was handed over than was asked for";
+                let error = PrinterError::new(ErrorCode::Internal, detail).ending(Ended::Job);
+                job.state = JobState::Failing(error);
+            }
         }
     }
 
@@ -143,7 +164,10 @@ impl Session {
 
 /// Whether a typed line asks for an emergency stop, which waits for nothing.
 fn is_emergency(text: &str) -> bool {
-    text.lines().any(|line| line.trim().eq_ignore_ascii_case("M112"))
+    text.lines().any(|line| {
+        let command = line.split(';').next().unwrap_or_default();
+        command.trim().eq_ignore_ascii_case("M112")
+    })
 }
 
 impl Ready {
@@ -162,37 +186,5 @@ impl Ready {
 
     fn sources(&mut self) -> impl Iterator<Item = &mut crate::planner::Source> {
         core::iter::once(&mut self.console).chain(self.job.as_mut().map(|job| &mut job.source))
-    }
-
-    /// Goes back to where the job was paused, and on.
-    fn resume(&mut self) -> Result<(), PrinterError> {
-        let at_rest = self.is_at_rest();
-        let Some(job) = self.job.as_mut().filter(|job| job.state == JobState::Paused) else {
-            return Err(PrinterError::new(ErrorCode::NotConnected, "there is no paused job"));
-        };
-        if !at_rest {
-            return Err(ErrorCode::BusyPrinting.into());
-        }
-        let Some(target) = job.paused_at else { return Err(ErrorCode::Internal.into()) };
-        if self.planner.guard.homed() != [true; 3] {
-            return Err(PrinterError::new(
-                ErrorCode::NotHomed,
-                "the position was lost while the job was paused",
-            ));
-        }
-        // Across first, at the greater height, then down: nothing is hit on the way. The filament stays as it is.
-        let [_, _, z, e] = self.planner.position();
-        let up = z.max(target[2]);
-        let here = self.planner.position();
-        for to in
-            [[here[0], here[1], up, e], [target[0], target[1], up, e], [target[0], target[1], target[2], e]]
-        {
-            self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
-        }
-        self.planner.rejoin(&job.source);
-        job.state = JobState::Printing;
-        job.paused_at = None;
-        self.events.push_back(Event::Resumed);
-        Ok(())
     }
 }

@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use gcode::LineNumber;
 use steps::{StepCommand, StepCommandKind};
 use units::{Seconds, Ticks};
 use wire::Command;
@@ -31,7 +32,7 @@ pub(super) enum Due {
     /// The machine gets to the end of a move.
     MoveEnd(ScheduledMove),
     /// A line's action.
-    Action(TimedAction),
+    Action(LineNumber, TimedAction),
 }
 
 /// A run of motion on the board's clock.
@@ -58,6 +59,8 @@ pub(super) struct MotionStream {
     pending: [Pending; MOTORS],
     timeline: VecDeque<(Ticks, Due)>,
     enabled: [bool; MOTORS],
+    /// The clock at which each motor's driver was last switched: the next switch must come later.
+    switched: [Ticks; MOTORS],
     /// Print time of the runs that have ended.
     elapsed: Seconds,
 }
@@ -82,12 +85,15 @@ impl MotionStream {
         self.elapsed = Seconds::ZERO;
     }
 
-    /// Whether the planner should be asked for more.
-    pub(super) fn wants_more(&self, generated_until: Ticks, clock_now: Ticks, board: &Board) -> bool {
+    /// Whether the planner should be asked for more. A run of which everything has been generated has yet to be ended.
+    pub(super) fn wants_more(&self, generated_until: Option<Ticks>, clock_now: Ticks, board: &Board) -> bool {
         let has_room = |motor| board.link.room(Lane::Motion(motor as u8)) >= LANE_ROOM_MIN;
         self.timeline.len() < TIMELINE_MAX
             && (0..MOTORS).all(has_room)
-            && self.run.is_none_or(|run| run.start + generated_until < clock_now + board.ticks(HORIZON))
+            && self
+                .run
+                .zip(generated_until)
+                .is_none_or(|(run, until)| run.start + until < clock_now + board.ticks(HORIZON))
     }
 
     /// Whether the motion planned so far ends soon.
@@ -97,7 +103,10 @@ impl MotionStream {
 
     /// A run starts as soon as the link allows.
     pub(super) fn start_run(&mut self, board: &Board, now: Seconds, homing: bool) -> Run {
-        let run = Run { start: board.run_clock(now), end: None, homing };
+        // A driver that has just been switched off is first on again.
+        let switched = self.switched.iter().fold(Ticks(0), |last, &clock| last.max(clock));
+        let start = board.run_clock(now).max(switched + board.ticks(ENABLE_LEAD * 2.0));
+        let run = Run { start, end: None, homing };
         self.run = Some(run);
         self.pending = [Pending { reset: true, forward: None }; MOTORS];
         run
@@ -110,7 +119,13 @@ impl MotionStream {
         }
         self.enabled[motor] = true;
         let clock = at.saturating_sub(board.ticks(ENABLE_LEAD));
+        self.switched[motor] = clock;
         Self::switch_driver(motor, true, clock, board);
+    }
+
+    /// Whether any driver is on.
+    pub(super) fn any_enabled(&self) -> bool {
+        self.enabled.contains(&true)
     }
 
     /// Switches drivers off, at rest.
@@ -118,6 +133,8 @@ impl MotionStream {
         let clock = board.output_clock(now);
         for motor in (0..MOTORS).filter(|&motor| motors[motor]) {
             if core::mem::take(&mut self.enabled[motor]) {
+                let clock = clock.max(self.switched[motor] + Ticks(1));
+                self.switched[motor] = clock;
                 Self::switch_driver(motor, false, clock, board);
             }
         }
@@ -206,12 +223,12 @@ impl MotionStream {
     /// or to the end of what has been generated. `None` where no run is being made.
     pub(super) fn queued_on_board(
         &self,
-        generated_until: Ticks,
+        generated_until: Option<Ticks>,
         clock_now: Ticks,
         board: &Board,
     ) -> Option<Seconds> {
         let run = self.run?;
-        let generated = run.end.unwrap_or(run.start + generated_until);
+        let generated = run.end.or(generated_until.map(|until| run.start + until))?;
         let until = board.link.motion_covered().map_or(generated, |covered| covered.min(generated));
         Some(board.clock.duration_of(until.saturating_sub(clock_now)))
     }

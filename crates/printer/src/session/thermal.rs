@@ -7,15 +7,12 @@ use gcode::Heater as HeaterName;
 use units::{Celsius, Seconds, Ticks};
 use wire::Command;
 
-use super::{
-    board::Board,
-    event::Event,
-    layout::{HeaterOids, Output},
-};
+use super::{board::Board, event::Event, fan::Fan, layout::HeaterOids};
 use crate::{
-    config::{FanConfig, HeaterConfig, PrinterConfig},
+    config::{HeaterConfig, PrinterConfig},
     error::{ErrorCode, PrinterError},
     heater::Heater,
+    machine,
     thermistor::Thermistor,
 };
 
@@ -27,8 +24,9 @@ const SAMPLE_INTERVAL: Seconds = Seconds(0.001);
 const SAMPLE_COUNT: u8 = 8;
 /// How many reports in a row may be out of range before the board stops everything.
 const RANGE_CHECKS: u8 = 4;
-/// A sensor that has not been heard of for this long is an error.
-const SILENCE_MAX: Seconds = Seconds(5.0);
+/// A sensor that has not been heard of for this long is an error: longer than it takes to notice that nobody is there.
+/// The board itself has switched the heater off by then.
+const SILENCE_MAX: Seconds = Seconds(8.0);
 /// The first reading comes this long after the configuration.
 const FIRST_REPORT: Seconds = Seconds(0.5);
 
@@ -49,9 +47,7 @@ struct Channel {
 #[derive(Debug)]
 pub(super) struct Thermal {
     channels: Vec<Channel>,
-    fan: Option<(Output, FanConfig)>,
-    fan_last_update: Ticks,
-    fan_speed: f64,
+    fan: Option<Fan>,
     started: Seconds,
 }
 
@@ -69,16 +65,15 @@ impl Thermal {
         }
         Self {
             channels,
-            fan: layout.fan.zip(config.fan.clone()),
-            fan_last_update: Ticks(0),
-            fan_speed: 0.0,
+            fan: layout.fan.zip(config.fan.clone()).map(|(output, config)| Fan::new(output, config)),
             started: now,
         }
     }
 
     fn channel(&mut self, name: HeaterName) -> Result<&mut Channel, PrinterError> {
         self.channels.iter_mut().find(|channel| channel.name == name).ok_or_else(|| {
-            PrinterError::new(ErrorCode::NoSuchHeater, format!("{name:?} is not in the machine file"))
+            let detail = format!("{} is not in the machine file", machine::heater_name(name));
+            PrinterError::new(ErrorCode::NoSuchHeater, detail)
         })
     }
 
@@ -100,6 +95,10 @@ impl Thermal {
         board: &mut Board,
         now: Seconds,
     ) -> Result<(), PrinterError> {
+        if target == Celsius::ZERO && self.heater(name).is_none() {
+            // What is not there is off: many files end with switching off whatever there might be.
+            return Ok(());
+        }
         let channel = self.channel(name)?;
         channel.heater.set_target(target)?;
         if target == Celsius::ZERO {
@@ -118,23 +117,21 @@ impl Thermal {
 
     /// The fan's speed at a clock, or as soon as is safe.
     pub(super) fn set_fan(&mut self, speed: f64, at: Option<Ticks>, board: &mut Board, now: Seconds) {
-        let Some((fan, config)) = &self.fan else { return };
-        let earliest =
-            board.output_clock(now).max(Ticks(self.fan_last_update.0 + u64::from(fan.cycle_ticks)));
-        let clock = at.unwrap_or(earliest).max(earliest);
-        self.fan_last_update = clock;
-        self.fan_speed = speed;
-        let command = Command::QueueDigitalOut {
-            oid: fan.oid.0,
-            clock: clock.low().0,
-            on_ticks: fan.on_ticks(config.duty(speed)),
-        };
-        board.control_at(&command, clock);
+        if let Some(fan) = &mut self.fan {
+            fan.set(speed, at, board, now);
+        }
+    }
+
+    /// Sends what has waited for its time.
+    pub(super) fn poll(&mut self, board: &mut Board, now: Seconds) {
+        if let Some(fan) = &mut self.fan {
+            fan.poll(board, now);
+        }
     }
 
     /// The fan's last speed.
-    pub(super) const fn fan_speed(&self) -> f64 {
-        self.fan_speed
+    pub(super) fn fan_speed(&self) -> f64 {
+        self.fan.as_ref().map_or(0.0, Fan::speed)
     }
 
     /// A report of a sensor: the sum of several readings.
@@ -152,7 +149,8 @@ impl Thermal {
         let temperature = channel.thermistor.temperature(ratio);
         // When the readings were made, not when they arrived: a late report must not look like a slope.
         let read_at = board.sync.time_of(next_clock) - REPORT_INTERVAL;
-        if channel.last_report.is_some_and(|last| read_at <= last) {
+        // A reading from the future is a damaged one, and would make all that follow look old.
+        if read_at > now + REPORT_INTERVAL || channel.last_report.is_some_and(|last| read_at <= last) {
             return None;
         }
         channel.last_report = Some(read_at);
@@ -175,7 +173,8 @@ impl Thermal {
         for channel in &self.channels {
             let heard = channel.last_report.unwrap_or(self.started).max(self.started);
             if now - heard > SILENCE_MAX {
-                let detail = format!("no reading of {:?} for {:.1} s", channel.name, (now - heard).0);
+                let detail =
+                    format!("no reading of {} for {:.1} s", channel.heater.config().name, (now - heard).0);
                 return Err(PrinterError::new(ErrorCode::LinkTimeout, detail));
             }
         }

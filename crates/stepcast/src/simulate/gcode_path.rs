@@ -186,7 +186,8 @@ impl<R: MoreGcode> GcodePath<R> {
 fn sagitta(arc: &Arc, chord: &Move) -> f64 {
     let [first, second, _] = arc.plane.axes();
     let (from, to) = (chord.from.to_array(), chord.to.to_array());
-    let half = ((to[first] - from[first]) / 2.0).hypot((to[second] - from[second]) / 2.0);
+    let [across, along] = [to[first] - from[first], to[second] - from[second]];
+    let half = (across * across + along * along).sqrt() / 2.0;
     let radius = arc.radii().into_iter().fold(0.0, f64::max);
     if half >= radius { radius } else { radius - (radius * radius - half * half).sqrt() }
 }

@@ -41,6 +41,8 @@ pub(crate) struct FakeBoard {
     pub(crate) sent: Vec<u8>,
     pub(crate) dictionary: Vec<u8>,
     pub(crate) resets: u32,
+    /// The resistors of the inputs, in the order in which they were configured.
+    pub(crate) pulls: Vec<(Pin, Pull)>,
 }
 
 impl Board for FakeBoard {
@@ -54,7 +56,8 @@ impl Board for FakeBoard {
         Ok(())
     }
 
-    fn configure_input(&mut self, pin: Pin, _: Pull) -> Result<(), PinError> {
+    fn configure_input(&mut self, pin: Pin, pull: Pull) -> Result<(), PinError> {
+        self.pulls.push((pin, pull));
         if pin < PINS { Ok(()) } else { Err(PinError) }
     }
 

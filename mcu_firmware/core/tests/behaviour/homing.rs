@@ -1,5 +1,6 @@
 //! Endstops, triggers and the steppers that obey them.
 
+use firmware_core::Pull;
 use wire::{Command, Response, ShutdownReason};
 
 use crate::bench::{Bench, Edge, MILLISECOND, SECOND, STEP_PIN, stepper, steps};
@@ -272,4 +273,11 @@ fn a_search_that_makes_no_sense_is_refused() {
         });
         assert_eq!(bench.shutdown(), Some(ShutdownReason::InvalidEndstop));
     }
+}
+
+#[test]
+fn a_switch_may_have_a_resistor_either_way_or_none() {
+    let config = |oid, pull_up| Command::ConfigEndstop { oid, pin: 10 + oid, pull_up };
+    let bench = Bench::configured(0, &[config(0, 1), config(1, 0), config(2, -1)]);
+    assert_eq!(bench.board.pulls, [(10, Pull::Up), (11, Pull::Floating), (12, Pull::Down)]);
 }

@@ -158,3 +158,21 @@ fn the_cycle_only_changes_with_an_empty_queue() {
     bench.send(&cycle(1 << 31));
     assert_eq!(bench.shutdown(), Some(ShutdownReason::InvalidPwm));
 }
+
+#[test]
+fn timers_that_never_let_up_leave_time_for_the_host() {
+    // A look at the clock takes 100 ticks: edges 100 ticks apart are due as soon as the one before has been made.
+    let mut bench = pwm(0, 200);
+    bench.send(&queue(1000, 100));
+    bench.board.ticks_per_read = 100;
+    for _ in 0..1000 {
+        let entered = bench.board.now;
+        let next = u64::from(bench.firmware.run_timers(&mut bench.board).0);
+        assert!(bench.board.now - entered <= MILLISECOND / 5, "the main loop was kept waiting");
+        assert!(next > bench.board.now, "and then had no time");
+        bench.board.now = next;
+    }
+    assert_eq!(bench.shutdown(), None);
+    bench.send(&Command::EmergencyStop {});
+    assert!(!bench.board.levels[usize::from(PIN)]);
+}

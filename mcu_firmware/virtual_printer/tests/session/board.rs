@@ -240,6 +240,16 @@ fn wiring_that_cannot_be_is_refused() {
 }
 
 #[test]
+fn faults_at_the_end_of_time_are_no_harm() {
+    let mut faults: Faults = "unplug".parse().expect("a fault");
+    for at in [f64::INFINITY, 1e300, f64::NAN, -1.0] {
+        faults.failures[0].at = Seconds(at);
+        let printer = VirtualPrinter::new(BoardProfile::rp2040(), &Machine::default(), &faults, 1, ());
+        assert!(printer.is_ok());
+    }
+}
+
+#[test]
 fn drivers_may_share_an_enable_pin() {
     let mut shared = machine();
     shared.motors[1].enable = shared.motors[0].enable.clone();

@@ -181,3 +181,14 @@ fn relative_moves_cannot_run_away() {
     let read = read(&"G91\nG1 X1000000\n".repeat(3));
     assert_eq!((read.moves().len(), read.said().len()), (1, 2));
 }
+
+#[test]
+fn a_move_that_was_not_made_leaves_the_offsets() {
+    let mut read = clean("G1 X10 Y10\nG92 X0\nG1 X500");
+    read.interpreter.stand_at(10.0, 10.0, 0.0);
+    let (mut actions, mut diagnostics) = (Vec::new(), Vec::new());
+    read.interpreter.line(LineNumber(4), b"G1 Y20", &mut actions, &mut diagnostics);
+    read.interpreter.line(LineNumber(5), b"G1 X1", &mut actions, &mut diagnostics);
+    let next = Read { actions, diagnostics, ..read };
+    assert_eq!(next.moves(), [[10.0, 20.0, 0.0, 0.0], [11.0, 20.0, 0.0, 0.0]]);
+}

@@ -117,3 +117,48 @@ fn columns_of_the_longest_line_fit() {
     line.truncate(LINE_BYTES_MAX - 3);
     assert_eq!(clean(&line).moves().len(), 1);
 }
+
+#[test]
+fn a_second_command_in_a_line_is_never_passed_over() {
+    for line in [
+        "G90 G1 X10",
+        "G21G90",
+        "G53 G0 X1",
+        "M83 G1 E5",
+        "G1 X5 M104 S200",
+        "G28 G1 Z5",
+        "m400 g91",
+        "G92.1 G1 X2",
+    ] {
+        let read = read(line);
+        assert!(read.actions.is_empty(), "{line}");
+        assert_eq!(read.diagnostics.len(), 1, "{line}");
+        assert_eq!(read.diagnostics[0].code, DiagnosticCode::SeveralCommands, "{line}");
+        assert_eq!(read.diagnostics[0].severity, Severity::Error);
+    }
+    assert_eq!(clean("(first) G1 X10 (then)").moves(), [[10.0, 0.0, 0.0, 0.0]]);
+}
+
+#[test]
+fn commands_without_words_say_so_and_heed_checksums() {
+    assert_eq!(read("G90 X5").said(), ["1:4-5 warning unused-word"]);
+    assert_eq!(read("M82 E").said(), ["1:4-5 error missing-value"]);
+    let damaged = read("G91*1\nG1 X1\nG1 X1");
+    assert_eq!(damaged.said(), ["1:3-5 error checksum-mismatch"]);
+    assert_eq!(damaged.interpreter.position().x, 1.0, "the damaged line had no effect");
+}
+
+#[test]
+fn any_number_of_byte_order_marks_is_no_deep_recursion() {
+    let line = b"\xef\xbb\xbf".repeat(LINE_BYTES_MAX / 3);
+    let (mut actions, mut diagnostics) = (Vec::new(), Vec::new());
+    Interpreter::new(Settings::default()).line(LineNumber(1), &line, &mut actions, &mut diagnostics);
+    assert_eq!((actions.len(), diagnostics.len()), (0, 1));
+    assert_eq!((diagnostics[0].code, diagnostics[0].columns.clone()), (DiagnosticCode::NotText, 3..4));
+}
+
+#[test]
+fn a_message_quotes_no_more_of_a_line_than_can_be_read() {
+    let read = read(&format!("G1 {}", "=".repeat(10_000)));
+    assert!(read.diagnostics[0].message.len() < 300);
+}

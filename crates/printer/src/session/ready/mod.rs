@@ -3,20 +3,20 @@
 //! One thing at a time: G-code comes from the job or from the console, and a barrier in it (homing, a wait) is dealt
 //! with before anything that follows.
 
+mod ending;
 mod plan;
 mod waiting;
 
-use std::collections::VecDeque;
-
+use gcode::LineNumber;
 use units::{Seconds, Ticks};
 
-use self::waiting::Wait;
+use self::waiting::{Held, Wait};
 use super::{
     board::Board,
     connect,
-    event::Event,
+    event::{Event, Events},
     inbox::{self, Message},
-    job::{Job, JobState, JobStatus, PROGRESS_INTERVAL},
+    job::{Job, JobStatus, PROGRESS_INTERVAL},
     stream::{Due, MotionStream},
     thermal::Thermal,
 };
@@ -56,8 +56,10 @@ pub(super) struct Ready {
     silence: Source,
     pub(super) job: Option<Job>,
     wait: Wait,
-    pub(super) events: VecDeque<Event>,
-    last_active: Seconds,
+    /// What a paused job was waiting for.
+    held: Held,
+    pub(super) events: Events,
+    pub(super) last_active: Seconds,
 }
 
 impl Ready {
@@ -76,7 +78,8 @@ impl Ready {
             silence: Source::default(),
             job: None,
             wait: Wait::Nothing,
-            events: VecDeque::new(),
+            held: Held::default(),
+            events: Events::default(),
             last_active: now,
         })
     }
@@ -94,6 +97,16 @@ impl Ready {
             return None;
         }
         self.stream.queued_on_board(self.planner.generated_until(), clock_now, &self.board)
+    }
+
+    /// Whether what was typed is still being carried out.
+    pub(super) fn is_console_busy(&self) -> bool {
+        !self.is_at_rest() || !matches!(self.wait, Wait::Nothing) || !self.console.is_drained()
+    }
+
+    /// The job whose G-code is being carried out.
+    fn active_job(&mut self) -> Option<&mut Job> {
+        self.job.as_mut().filter(|job| job.is_active())
     }
 
     /// Whether nothing moves and nothing is about to.
@@ -115,7 +128,7 @@ impl Ready {
             Message::Analog { oid, next_clock, sum } => {
                 let next_clock = self.board.clock_at(now).nearest(next_clock);
                 match self.thermal.receive(oid, next_clock, sum, &mut self.board, now) {
-                    Some(Ok(event)) => self.events.push_back(event),
+                    Some(Ok(event)) => self.events.push(event),
                     Some(Err(error)) => return Err(Failure::Stop(error)),
                     None => {}
                 }
@@ -143,10 +156,7 @@ impl Ready {
     fn on_homing_message(&mut self, message: Message, now: Seconds) {
         let Wait::Homing { axis, .. } = &mut self.wait else { return };
         let result = match message {
-            Message::Position { oid, position } => {
-                axis.on_position(oid, position);
-                Ok(())
-            }
+            Message::Position { oid, position } => axis.on_position(oid, position),
             Message::Endstop { oid, homing, pin_value } => {
                 axis.on_endstop(oid, homing, pin_value, now, &mut self.board)
             }
@@ -171,6 +181,7 @@ impl Ready {
         while let Some(due) = self.stream.pop_due(clock_now) {
             self.on_due(due, now);
         }
+        self.thermal.poll(&mut self.board, now);
         self.stream.take_finished(clock_now, &self.board);
         self.advance_wait(now);
         self.pump(now)?;
@@ -191,29 +202,38 @@ impl Ready {
                     self.job.as_mut().filter(|job| made.line > 0 && now - job.told >= PROGRESS_INTERVAL)
                 {
                     job.told = now;
-                    self.events.push_back(Event::Progress { line: made.line, elapsed });
+                    self.events.push(Event::Progress { line: made.line, elapsed });
                 }
             }
-            Due::Action(action) => self.act(action, now),
+            Due::Action(line, action) => self.act(line, action, now),
         }
     }
 
-    fn act(&mut self, action: TimedAction, now: Seconds) {
+    /// Whether a job that has been ended may still do this: what was read of it ahead must not switch anything on.
+    fn is_allowed(&self, action: &TimedAction) -> bool {
+        let is_ending = self.job.as_ref().is_some_and(Job::is_ending);
+        !(is_ending && matches!(action, TimedAction::SetTemperature { .. } | TimedAction::Fan { .. }))
+    }
+
+    fn act(&mut self, line: LineNumber, action: TimedAction, now: Seconds) {
+        if !self.is_allowed(&action) {
+            return;
+        }
         match action {
             TimedAction::SetTemperature { heater, target } => {
                 if let Err(error) = self.thermal.set_target(heater, target, &mut self.board, now) {
-                    self.source_failed(error, now);
+                    self.source_failed(error.at_line(line.0), now);
                 }
             }
             TimedAction::TurnOffHeaters => self.thermal.all_off(&mut self.board, now),
             TimedAction::Fan { speed, .. } => self.thermal.set_fan(speed, None, &mut self.board, now),
-            TimedAction::Message(text) => self.events.push_back(Event::Message(text)),
-            TimedAction::Annotation(annotation) => self.events.push_back(Event::Annotation(annotation)),
-            TimedAction::Object(object) => self.events.push_back(Event::Object(object)),
-            TimedAction::ReportTemperatures => self.events.push_back(Event::Message(self.thermal.describe())),
+            TimedAction::Message(text) => self.events.push(Event::Message(text)),
+            TimedAction::Annotation(annotation) => self.events.push(Event::Annotation(annotation)),
+            TimedAction::Object(object) => self.events.push(Event::Object(object)),
+            TimedAction::ReportTemperatures => self.events.push(Event::Message(self.thermal.describe())),
             TimedAction::ReportPosition => {
                 let [x, y, z, e] = self.planner.position();
-                self.events.push_back(Event::Message(format!("X:{x:.3} Y:{y:.3} Z:{z:.3} E:{e:.3}")));
+                self.events.push(Event::Message(format!("X:{x:.3} Y:{y:.3} Z:{z:.3} E:{e:.3}")));
             }
         }
     }
@@ -221,96 +241,8 @@ impl Ready {
     /// The source whose G-code is being carried out.
     fn source_mut(&mut self) -> &mut Source {
         match &mut self.job {
-            Some(job) if job.state != JobState::Paused => &mut job.source,
+            Some(job) if job.is_active() => &mut job.source,
             _ => &mut self.console,
-        }
-    }
-
-    /// The G-code that is being carried out cannot go on: a job ends with its heaters off, the console only forgets
-    /// what else it was told.
-    pub(super) fn source_failed(&mut self, error: PrinterError, now: Seconds) {
-        self.planner.drop_barrier();
-        match &mut self.job {
-            Some(job) if job.state != JobState::Paused => {
-                if !matches!(job.state, JobState::Failing(_)) {
-                    job.state = JobState::Failing(error);
-                    if !matches!(self.wait, Wait::Homing { .. }) {
-                        self.wait = Wait::Nothing;
-                    }
-                    self.thermal.all_off(&mut self.board, now);
-                }
-            }
-            _ => {
-                self.console.clear();
-                self.events.push_back(Event::Error(error));
-            }
-        }
-    }
-
-    pub(super) fn pause(&mut self) {
-        if let Some(job) = self.job.as_mut().filter(|job| job.state == JobState::Printing) {
-            job.state = JobState::Pausing;
-        }
-    }
-
-    pub(super) fn cancel(&mut self, now: Seconds) {
-        let Some(job) = &mut self.job else { return };
-        if matches!(job.state, JobState::Failing(_)) {
-            return;
-        }
-        job.state = JobState::Cancelling;
-        if !matches!(self.wait, Wait::Homing { .. }) {
-            self.wait = Wait::Nothing;
-        }
-        self.planner.drop_barrier();
-        self.thermal.all_off(&mut self.board, now);
-        self.thermal.set_fan(0.0, None, &mut self.board, now);
-    }
-
-    /// What is done once the machine is at rest: a job that was told to stop has stopped, and a machine that nobody
-    /// uses is switched off.
-    fn rest(&mut self, now: Seconds) {
-        if !self.is_at_rest() || !matches!(self.wait, Wait::Nothing) {
-            self.last_active = now;
-            return;
-        }
-        let state = self.job.as_ref().map(|job| job.state.clone());
-        match state {
-            Some(JobState::Pausing) => {
-                let position = self.planner.position();
-                if let Some(job) = &mut self.job {
-                    job.state = JobState::Paused;
-                    job.paused_at = Some(position);
-                }
-                self.console.clear();
-                self.planner.adopt(&mut self.console);
-                self.events.push_back(Event::Paused);
-            }
-            Some(JobState::Cancelling) => self.end_job(Event::JobCancelled),
-            Some(JobState::Failing(error)) => self.end_job(Event::Error(error)),
-            Some(JobState::Printing | JobState::Paused) => {}
-            None => self.idle(now),
-        }
-    }
-
-    fn end_job(&mut self, event: Event) {
-        self.job = None;
-        self.planner.drop_barrier();
-        self.console.clear();
-        self.planner.adopt(&mut self.console);
-        self.events.push_back(event);
-    }
-
-    fn idle(&mut self, now: Seconds) {
-        if now - self.last_active < self.config.idle_timeout.timeout {
-            return;
-        }
-        self.last_active = now;
-        if self.thermal.any_target() || self.planner.guard.homed() != [false; 3] {
-            self.thermal.all_off(&mut self.board, now);
-            self.stream.disable([true; 4], &mut self.board, now);
-            (0..3).for_each(|axis| self.planner.guard.set_homed(axis, false));
-            self.events.push_back(Event::Message("idle for too long: heaters and motors are off".into()));
         }
     }
 

@@ -1,12 +1,12 @@
 //! From the planner to the board: items of the plan, one after the other, as far ahead as the stream wants them.
 
-use gcode::{Heater as HeaterName, Severity};
-use units::Seconds;
+use gcode::{Heater as HeaterName, LineNumber, Severity};
+use units::{Celsius, Seconds};
 
 use super::{Failure, Ready, Wait};
 use crate::{
     error::{ErrorCode, PrinterError},
-    planner::{ExtrusionPermit, Planned, TimedAction},
+    planner::{Barrier, ExtrusionPermit, Planned, TimedAction},
     session::{
         event::{Event, ScheduledMove},
         job::JobState,
@@ -40,11 +40,12 @@ impl Ready {
             }
             let source = match &mut self.job {
                 _ if homing || stopping => &mut self.silence,
-                Some(job) if job.state != JobState::Paused => &mut job.source,
+                Some(job) if job.is_active() => &mut job.source,
                 _ => &mut self.console,
             };
             let planned = match self.planner.next(source) {
                 Ok(planned) => planned,
+                Err(error) if self.planner.is_broken() => return Err(Failure::Stop(error)),
                 Err(error) => {
                     self.source_failed(error, now);
                     continue;
@@ -57,7 +58,7 @@ impl Ready {
         Ok(())
     }
 
-    fn extrusion_permit(&self) -> ExtrusionPermit {
+    pub(super) fn extrusion_permit(&self) -> ExtrusionPermit {
         match self.thermal.heater(HeaterName::Tool(0)) {
             Some(heater) if !heater.can_extrude() => {
                 ExtrusionPermit::TooCold { celsius: heater.temperature().unwrap_or_default().0 }
@@ -68,7 +69,10 @@ impl Ready {
 
     /// Handles one item of the plan; `false` when there is nothing more for now.
     pub(super) fn take(&mut self, planned: Planned, now: Seconds) -> Result<bool, Failure> {
-        self.last_active = now;
+        if planned != Planned::NeedsInput {
+            self.last_active = now;
+        }
+        self.note(&planned);
         match planned {
             Planned::RunStarted(position) => {
                 let homing = matches!(self.wait, Wait::Homing { .. });
@@ -76,7 +80,7 @@ impl Ready {
                 if let Wait::Homing { axis, .. } = &mut self.wait {
                     axis.run_started(run.start, &mut self.board, now);
                 }
-                self.events.push_back(Event::RunStarted { at: run.start, position });
+                self.events.push(Event::RunStarted { at: run.start, position });
             }
             Planned::Move(planned) => {
                 let Some(run) = self.stream.run() else { return Ok(true) };
@@ -90,10 +94,10 @@ impl Ready {
                     homing: run.homing,
                 };
                 self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
-                self.events.push_back(Event::Move(scheduled));
+                self.events.push(Event::Move(scheduled));
             }
             Planned::Steps(command) => self.stream.push(&command, &mut self.board),
-            Planned::Timed { at, action, .. } => self.on_timed(at, action, now),
+            Planned::Timed { at, line, action } => self.on_timed(at, line, action, now),
             Planned::RunEnded(at) => {
                 if let Some(run) = self.stream.run() {
                     let end = run.start + self.board.ticks(at);
@@ -101,45 +105,64 @@ impl Ready {
                     if let Wait::Homing { axis, .. } = &mut self.wait {
                         axis.run_planned(end);
                     }
-                    self.events.push_back(Event::RunEnded { at: end });
+                    self.events.push(Event::RunEnded { at: end });
                 }
             }
             Planned::Barrier { line, barrier } => return self.on_barrier(line, &barrier, now),
             Planned::Notice(diagnostic) => self.on_notice(diagnostic, now),
             Planned::NeedsInput => return Ok(self.on_drained(now)),
-            Planned::EndOfSource => {
-                self.job = None;
-                self.planner.adopt(&mut self.console);
-                self.events.push_back(Event::JobDone);
-            }
+            Planned::EndOfSource => self.finish_job(now),
         }
         Ok(true)
     }
 
-    pub(super) fn on_timed(&mut self, at: Seconds, action: TimedAction, now: Seconds) {
+    /// Notes what a job leaves behind.
+    fn note(&mut self, planned: &Planned) {
+        let Some(job) = self.active_job() else { return };
+        let target = match planned {
+            Planned::Move(planned) => {
+                job.has_moved |= planned.tag > 0;
+                return;
+            }
+            Planned::Timed { action: TimedAction::SetTemperature { heater, target }, .. }
+            | Planned::Barrier { barrier: Barrier::WaitTemperature { heater, target, .. }, .. }
+                if *heater == HeaterName::Tool(0) =>
+            {
+                *target
+            }
+            Planned::Timed { action: TimedAction::TurnOffHeaters, .. } => Celsius::ZERO,
+            _ => return,
+        };
+        job.leaves_hot = target > Celsius::ZERO;
+    }
+
+    fn on_timed(&mut self, at: Seconds, line: LineNumber, action: TimedAction, now: Seconds) {
         let Some(run) = self.stream.run() else {
-            self.act(action, now);
+            self.act(line, action, now);
             return;
         };
+        if !self.is_allowed(&action) {
+            return;
+        }
         let clock = run.start + self.board.ticks(at);
         match action {
             // The board itself does it at that clock.
             TimedAction::Fan { speed, .. } => self.thermal.set_fan(speed, Some(clock), &mut self.board, now),
-            action => self.stream.schedule(clock, Due::Action(action)),
+            action => self.stream.schedule(clock, Due::Action(line, action)),
         }
     }
 
     pub(super) fn on_notice(&mut self, diagnostic: gcode::Diagnostic, now: Seconds) {
         let line = diagnostic.line.0;
-        let confirmed = self.job.as_ref().is_none_or(|job| job.is_confirmed(line));
+        let confirmed = self.active_job().is_some_and(|job| job.is_confirmed(line));
         let code = match diagnostic.severity {
             Severity::Error => Some(ErrorCode::InvalidGcode),
-            Severity::Blocking if !confirmed || self.job.is_none() => Some(ErrorCode::UnknownCommand),
+            Severity::Blocking if !confirmed => Some(ErrorCode::UnknownCommand),
             Severity::Blocking | Severity::Warning | Severity::Info => None,
         };
         match code {
             Some(code) => self.source_failed(PrinterError::new(code, diagnostic.message).at_line(line), now),
-            None => self.events.push_back(Event::Notice(diagnostic)),
+            None => self.events.push(Event::Notice(diagnostic)),
         }
     }
 

@@ -8,6 +8,7 @@ use units::{Celsius, Seconds};
 use super::{Failure, Ready};
 use crate::{
     error::{ErrorCode, PrinterError},
+    machine,
     planner::Barrier,
     session::{
         event::Event,
@@ -21,7 +22,52 @@ pub(super) enum Wait {
     Nothing,
     Heater { heater: HeaterName, until: HeaterGoal },
     Dwell { until: Seconds },
-    Homing { axis: Box<AxisHoming>, remaining: VecDeque<usize> },
+    Homing { axis: Box<AxisHoming>, remaining: VecDeque<usize>, axes: [bool; 3], line: LineNumber },
+}
+
+/// What a job was waiting for, or was about to, when it was paused.
+#[derive(Debug, Default)]
+pub(super) struct Held {
+    pub(super) wait: HeldWait,
+    pub(super) barrier: Option<(LineNumber, Barrier)>,
+}
+
+/// A wait that is broken off and taken up again.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) enum HeldWait {
+    #[default]
+    Nothing,
+    Heater {
+        heater: HeaterName,
+        until: HeaterGoal,
+    },
+    Dwell {
+        rest: Seconds,
+    },
+}
+
+impl Wait {
+    /// Breaks the wait off. Homing cannot be: it is done to its end.
+    pub(super) fn hold(&mut self, now: Seconds) -> HeldWait {
+        let held = match *self {
+            Self::Heater { heater, until } => HeldWait::Heater { heater, until },
+            Self::Dwell { until } => HeldWait::Dwell { rest: until - now },
+            Self::Nothing | Self::Homing { .. } => return HeldWait::Nothing,
+        };
+        *self = Self::Nothing;
+        held
+    }
+}
+
+impl HeldWait {
+    /// Takes the wait up again.
+    pub(super) fn go_on(self, now: Seconds) -> Wait {
+        match self {
+            Self::Nothing => Wait::Nothing,
+            Self::Heater { heater, until } => Wait::Heater { heater, until },
+            Self::Dwell { rest } => Wait::Dwell { until: now + rest },
+        }
+    }
 }
 
 /// When a wait for a heater is over.
@@ -70,8 +116,8 @@ impl Ready {
             Ok(Wish::Wait) => {}
             Ok(Wish::Move(wanted)) => {
                 if at_rest {
-                    let homed = self.planner.guard.homed()[axis];
-                    self.planner.set_axis(axis, wanted.from_mm, homed);
+                    // A stand-in: where it is shows only at the endstop.
+                    self.planner.set_axis(axis, wanted.from_mm, false);
                     let mut to = self.planner.position();
                     to[axis] = wanted.to_mm;
                     if let Err(error) = self.planner.push_raw_move(to, wanted.speed, LineNumber(0)) {
@@ -90,8 +136,12 @@ impl Ready {
             Ok(Wish::Done) => {
                 let (position_mm, steps) = (homing.position_mm(), homing.steps);
                 self.planner.set_axis(axis, position_mm, true);
-                self.events.push_back(Event::Homed { axis, position_mm, steps });
+                self.events.push(Event::Homed { axis, position_mm, steps });
                 self.home_next();
+            }
+            Ok(Wish::Cancelled) => {
+                self.wait = Wait::Nothing;
+                self.planner.correct(&mut self.console);
             }
             Err(error) => self.homing_failed(error, now),
         }
@@ -99,22 +149,24 @@ impl Ready {
 
     /// The next axis of a homing, or its end.
     pub(super) fn home_next(&mut self) {
-        let Wait::Homing { remaining, .. } = &mut self.wait else { return };
-        let mut remaining = core::mem::take(remaining);
+        let Wait::Homing { remaining, axes, line, .. } = &mut self.wait else { return };
+        let (mut remaining, axes, line) = (core::mem::take(remaining), *axes, *line);
         self.wait = Wait::Nothing;
         while let Some(axis) = remaining.pop_front() {
             if let Some(homing) = AxisHoming::new(axis, &self.config.steppers[axis], &self.board) {
-                self.wait = Wait::Homing { axis: Box::new(homing), remaining };
+                self.wait = Wait::Homing { axis: Box::new(homing), remaining, axes, line };
                 return;
             }
         }
-        let [x, y, z, _] = self.planner.position();
-        self.source_mut().interpreter.set_axes(Some(x), Some(y), Some(z));
+        let position = self.planner.position();
+        let [x, y, z] = core::array::from_fn(|axis| axes[axis].then_some(position[axis]));
+        self.source_mut().interpreter.set_axes(x, y, z);
     }
 
-    pub(super) fn homing_failed(&mut self, error: PrinterError, now: Seconds) {
-        if let Wait::Homing { axis, .. } = &self.wait {
+    pub(super) fn homing_failed(&mut self, mut error: PrinterError, now: Seconds) {
+        if let Wait::Homing { axis, line, .. } = &self.wait {
             let axis = axis.axis;
+            error = error.at_line(line.0);
             self.planner.abandon_run();
             self.stream.abandon(&mut self.board);
             let position = self.planner.position()[axis];
@@ -133,14 +185,11 @@ impl Ready {
     ) -> Result<bool, Failure> {
         match *barrier {
             Barrier::Home(axes) => {
-                let remaining: VecDeque<usize> = (0..3).filter(|&axis| axes[axis]).collect();
-                if let Some(&axis) = remaining.front()
+                let mut remaining: VecDeque<usize> = (0..3).filter(|&axis| axes[axis]).collect();
+                if let Some(axis) = remaining.pop_front()
                     && let Some(homing) = AxisHoming::new(axis, &self.config.steppers[axis], &self.board)
                 {
-                    self.wait = Wait::Homing { axis: Box::new(homing), remaining };
-                    if let Wait::Homing { remaining, .. } = &mut self.wait {
-                        remaining.pop_front();
-                    }
+                    self.wait = Wait::Homing { axis: Box::new(homing), remaining, axes, line };
                 }
             }
             Barrier::WaitTemperature { heater, target, wait } => {
@@ -155,6 +204,10 @@ impl Ready {
                     Err(error) => self.source_failed(error.at_line(line.0), now),
                 }
             }
+            Barrier::WaitForTemperature { heater, .. } if self.thermal.heater(heater).is_none() => {
+                let detail = format!("{} is not in the machine file", machine::heater_name(heater));
+                self.source_failed(PrinterError::new(ErrorCode::NoSuchHeater, detail).at_line(line.0), now);
+            }
             Barrier::WaitForTemperature { heater, minimum, maximum } => {
                 self.wait = Wait::Heater { heater, until: HeaterGoal::Between(minimum, maximum) };
             }
@@ -166,9 +219,14 @@ impl Ready {
                 }
             }
             Barrier::WaitForMoves => {}
-            Barrier::Pause(_) => self.pause(),
-            Barrier::Cancel => self.cancel(now),
-            Barrier::EmergencyStop => return Err(Failure::Stop(ErrorCode::EmergencyStop.into())),
+            // Typed where there is no job, they mean nothing.
+            Barrier::Pause(_) => drop(self.pause(now)),
+            Barrier::Cancel => drop(self.cancel(now)),
+            Barrier::EmergencyStop => {
+                let detail = "M112 was carried out";
+                let error = PrinterError::new(ErrorCode::EmergencyStop, detail).at_line(line.0);
+                return Err(Failure::Stop(error));
+            }
         }
         Ok(matches!(self.wait, Wait::Nothing))
     }

@@ -1,0 +1,246 @@
+//! What comes out of a plan, and when.
+
+use gcode::Heater;
+use steps::StepCommandKind;
+use units::Celsius;
+
+use super::*;
+use crate::config;
+
+const CLOCK: Hertz = Hertz(12_000_000);
+
+fn machine_file() -> PrinterConfig {
+    let text = include_str!("../../../../samples/printer.cfg");
+    config::parse(text).0.expect("the sample machine")
+}
+
+/// A planner that is homed and hot.
+fn planner() -> (Planner, Source) {
+    let mut planner = Planner::new(&machine_file(), CLOCK).unwrap();
+    (0..3).for_each(|axis| planner.set_axis(axis, 0.0, true));
+    planner.guard.extrusion = ExtrusionPermit::Allowed;
+    let mut source = Source::default();
+    planner.begin_job(&mut source);
+    (planner, source)
+}
+
+fn feed(source: &mut Source, text: &str) {
+    source.feed(text.as_bytes());
+    source.end();
+}
+
+/// Everything but steps, up to the end or the first error.
+fn items(planner: &mut Planner, source: &mut Source) -> Vec<Planned> {
+    let mut items = Vec::new();
+    loop {
+        match planner.next(source).unwrap() {
+            Planned::Steps(_) => {}
+            end @ (Planned::EndOfSource | Planned::NeedsInput) => {
+                items.push(end);
+                return items;
+            }
+            item => items.push(item),
+        }
+    }
+}
+
+fn plan(text: &str) -> Vec<Planned> {
+    let (mut planner, mut source) = planner();
+    feed(&mut source, text);
+    items(&mut planner, &mut source)
+}
+
+fn moves(items: &[Planned]) -> Vec<PlannedMove> {
+    items.iter().filter_map(|item| if let Planned::Move(mv) = item { Some(*mv) } else { None }).collect()
+}
+
+fn timed(items: &[Planned]) -> Vec<(f64, u32, TimedAction)> {
+    let timed = |item: &Planned| match item {
+        Planned::Timed { at, line, action } => Some((at.0, line.0, action.clone())),
+        _ => None,
+    };
+    items.iter().filter_map(timed).collect()
+}
+
+fn fan(speed: f64) -> TimedAction {
+    TimedAction::Fan { index: 0, speed }
+}
+
+#[test]
+fn what_happens_on_the_way_happens_at_the_end_of_the_move_before() {
+    let items = plan("M106 S255\nG1 X10 F600\nM107\nG1 X20\nG1 X20\nM104 S5\nG1 X30\nM106 S51\n");
+    let made = moves(&items);
+    let ends: Vec<f64> = made.iter().map(PlannedMove::end_time).collect();
+    let heat = TimedAction::SetTemperature { heater: Heater::Tool(0), target: Celsius(5.0) };
+    assert_eq!(
+        timed(&items),
+        [(0.0, 1, fan(1.0)), (ends[0], 3, fan(0.0)), (ends[1], 6, heat), (ends[2], 8, fan(0.2))]
+    );
+    // The moves go on through all of it.
+    assert!(made[1].start_velocity > 9.0);
+    assert_eq!(items.iter().filter(|item| matches!(item, Planned::RunStarted(_))).count(), 1);
+}
+
+#[test]
+fn what_comes_after_a_dwell_happens_after_it() {
+    let items = plan("G1 X10 F600\nG4 P500\nM106\nG1 X20\nM107\nG4 S1\n");
+    let made = moves(&items);
+    assert!((made[1].start_time - made[0].end_time() - 0.5).abs() < 1e-9);
+    assert_eq!(timed(&items), [(made[1].start_time, 3, fan(1.0)), (made[1].end_time(), 5, fan(0.0))]);
+    let Some(Planned::RunEnded(end)) = items.get(items.len() - 2) else { panic!("{items:?}") };
+    assert!((end.0 - made[1].end_time() - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_long_dwell_and_one_at_rest_are_barriers() {
+    for text in ["G4 P500\n", "G1 X1 F600\nG4 S3\nG1 X2\n"] {
+        let items = plan(text);
+        let at = items.iter().position(|item| matches!(item, Planned::Barrier { .. })).unwrap();
+        assert!(matches!(items[at], Planned::Barrier { barrier: Barrier::Dwell(_), .. }));
+        assert!(at == 0 || matches!(items[at - 1], Planned::RunEnded(_)));
+    }
+}
+
+#[test]
+fn barriers_come_at_rest_and_before_what_follows() {
+    for (line, barrier) in [
+        ("G28 X", Barrier::Home([true, false, false])),
+        ("M400", Barrier::WaitForMoves),
+        ("M84 X", Barrier::MotorsOff([true, false, false, false])),
+        ("M112", Barrier::EmergencyStop),
+        (
+            "M109 S50",
+            Barrier::WaitTemperature {
+                heater: Heater::Tool(0),
+                target: Celsius(50.0),
+                wait: Wait::UntilHeated,
+            },
+        ),
+    ] {
+        let items = plan(&format!("G1 X10 F6000\n{line}\nG1 X20\n"));
+        let kinds: Vec<&Planned> = items.iter().filter(|item| !matches!(item, Planned::Move(_))).collect();
+        let [
+            Planned::RunStarted(_),
+            Planned::RunEnded(_),
+            Planned::Barrier { line: at, barrier: found },
+            Planned::RunStarted(from),
+            Planned::RunEnded(_),
+            Planned::EndOfSource,
+        ] = kinds[..]
+        else {
+            panic!("{items:#?}")
+        };
+        assert_eq!((at.0, found, from[0]), (2, &barrier, 10.0));
+        assert_eq!(moves(&items)[0].end_velocity, 0.0);
+    }
+}
+
+#[test]
+fn a_file_may_ask_for_less_than_the_machine_allows_but_not_for_more() {
+    let accel = |text: &str| {
+        let (mut planner, mut source) = planner();
+        feed(&mut source, &format!("{text}\nG1 X100 F6000\n"));
+        moves(&items(&mut planner, &mut source))[0].accel
+    };
+    assert_eq!(accel("M204 S500"), 500.0);
+    assert_eq!(accel("M204 S50000"), 3000.0);
+    assert_eq!(accel("SET_VELOCITY_LIMIT ACCEL=700\nM204 S800"), 800.0);
+    let speed = |text: &str| {
+        let (mut planner, mut source) = planner();
+        feed(&mut source, &format!("{text}\nG1 X250 F60000\n"));
+        moves(&items(&mut planner, &mut source))[0].cruise_velocity
+    };
+    assert_eq!(speed("SET_VELOCITY_LIMIT VELOCITY=50"), 50.0);
+    assert_eq!(speed("SET_VELOCITY_LIMIT VELOCITY=5000"), 300.0);
+    // The next job begins with the machine file's limits.
+    let (mut planner, mut source) = planner();
+    feed(&mut source, "M204 S100\nG1 X1\n");
+    items(&mut planner, &mut source);
+    let mut next = Source::default();
+    planner.begin_job(&mut next);
+    feed(&mut next, "G1 X100 F6000\n");
+    assert_eq!(moves(&items(&mut planner, &mut next))[0].accel, 3000.0);
+}
+
+#[test]
+fn two_sources_share_the_filament() {
+    let (mut planner, mut job) = planner();
+    job.feed(b"M83\nG1 X10 E1 F600\n");
+    items(&mut planner, &mut job);
+    planner.finish_run();
+    items(&mut planner, &mut job);
+    let mut console = Source::default();
+    planner.adopt(&mut console);
+    console.feed(b"M83\nG1 X50 E5 F600\n");
+    items(&mut planner, &mut console);
+    planner.finish_run();
+    items(&mut planner, &mut console);
+    assert_eq!(planner.position(), [50.0, 0.0, 0.0, 6.0]);
+    planner.push_raw_move([10.0, 0.0, 0.0, 6.0], MmPerS(50.0), LineNumber(0)).unwrap();
+    planner.rejoin(&mut job, 5.0);
+    job.feed(b"G1 X20 E1\n");
+    job.end();
+    let made = moves(&items(&mut planner, &mut job));
+    let e: Vec<[f64; 2]> = made.iter().map(|mv| [mv.from[3], mv.to[3]]).collect();
+    assert_eq!(e, [[6.0, 6.0], [6.0, 7.0]]);
+}
+
+#[test]
+fn a_refused_move_is_not_where_the_next_one_starts() {
+    let (mut planner, mut source) = planner();
+    source.feed(b"G1 X10 F600\nG1 X1000\nG1 Y10\n");
+    let error = loop {
+        match planner.next(&mut source) {
+            Ok(_) => {}
+            Err(error) => break error,
+        }
+    };
+    assert_eq!((error.code, error.line), (ErrorCode::MoveOutOfRange, Some(2)));
+    // Even where nobody corrects the source, the way there is judged from where the machine is.
+    let error = planner.next(&mut source).unwrap_err();
+    assert_eq!((error.code, error.line), (ErrorCode::MoveOutOfRange, Some(3)));
+    planner.correct(&mut source);
+    source.feed(b"G1 Y20\n");
+    source.end();
+    items(&mut planner, &mut source);
+    assert_eq!(planner.position(), [10.0, 20.0, 0.0, 0.0]);
+}
+
+#[test]
+fn other_fans_and_pressure_advance_are_said_once() {
+    let items = plan("M106 P1 S255\nM106 P2\nM900 K0.04\nM900 K0.05\nSET_PRESSURE_ADVANCE ADVANCE=0.1\n");
+    let notices: Vec<u32> = items
+        .iter()
+        .filter_map(|item| if let Planned::Notice(said) = item { Some(said.line.0) } else { None })
+        .collect();
+    assert_eq!(notices, [1, 3]);
+    assert_eq!(timed(&items), []);
+}
+
+#[test]
+fn every_step_of_a_run_comes_before_its_end() {
+    let (mut planner, mut source) = planner();
+    feed(&mut source, "G1 X10 Y5 F3000\nG1 X0 Y0\n");
+    let (mut steps, mut ended) = ([0_i64; MOTORS], false);
+    let mut forward = [true; MOTORS];
+    loop {
+        match planner.next(&mut source).unwrap() {
+            Planned::Steps(command) => {
+                assert!(!ended);
+                match command.kind {
+                    StepCommandKind::SetDir { forward: way } => forward[command.motor] = way,
+                    StepCommandKind::QueueStep { count, .. } => {
+                        steps[command.motor] +=
+                            i64::from(count) * if forward[command.motor] { 1 } else { -1 };
+                    }
+                }
+            }
+            Planned::RunEnded(_) => ended = true,
+            Planned::EndOfSource => break,
+            _ => {}
+        }
+    }
+    assert!(ended);
+    assert_eq!(steps, [0; MOTORS]);
+    assert_eq!(planner.generator().stats()[0].steps, 2 * 800);
+}

@@ -1,0 +1,180 @@
+//! One axis on its way home, with a board that is played by hand.
+
+use super::*;
+use crate::{config, link::Lane};
+
+const ENDSTOP: u8 = 0;
+const TRIGGER: u8 = 1;
+
+struct Table {
+    board: Board,
+    homing: AxisHoming,
+    now: Seconds,
+}
+
+impl Table {
+    fn new(retract: &str) -> Self {
+        let text = include_str!("../../../../../samples/printer.cfg");
+        let text = text.replacen("homing_retract_dist: 5", &format!("homing_retract_dist: {retract}"), 1);
+        let config = config::parse(&text).0.expect("a machine");
+        let board = Board::for_tests(&config);
+        let homing = AxisHoming::new(0, &config.steppers[0], &board).expect("an axis");
+        Self { board, homing, now: Seconds::ZERO }
+    }
+
+    fn poll(&mut self, at_rest: bool) -> Result<Wish, PrinterError> {
+        self.homing.poll(&mut self.board, self.now, at_rest)
+    }
+
+    fn position(&mut self, steps: i32) -> Result<(), PrinterError> {
+        assert_eq!(self.poll(true), Ok(Wish::Wait));
+        self.homing.on_position(self.homing.stepper, steps)
+    }
+
+    fn trigger(&mut self, can_trigger: bool, reason: u8) -> Result<(), PrinterError> {
+        self.homing.on_trigger(TRIGGER, can_trigger, reason, self.now, &mut self.board)
+    }
+
+    fn endstop(&mut self, homing: bool, pin: bool) -> Result<(), PrinterError> {
+        self.homing.on_endstop(ENDSTOP, homing, pin, self.now, &mut self.board)
+    }
+
+    /// From the question for the position to the middle of an approach.
+    fn approach(&mut self, steps: i32) -> HomingMove {
+        self.position(steps).unwrap();
+        let Ok(Wish::Move(wanted)) = self.poll(true) else { panic!() };
+        let start = self.board.clock_at(self.now);
+        self.homing.run_started(start, &mut self.board, self.now);
+        assert_eq!(self.poll(false), Ok(Wish::Wait));
+        wanted
+    }
+
+    /// The switch closes here.
+    fn found(&mut self, steps: i32) -> Result<(), PrinterError> {
+        self.trigger(false, REASON_ENDSTOP)?;
+        assert_eq!(self.poll(false), Ok(Wish::Abandon));
+        self.position(steps)
+    }
+
+    fn back_off(&mut self) -> HomingMove {
+        let Ok(Wish::Move(wanted)) = self.poll(true) else { panic!() };
+        self.homing.run_started(Ticks(0), &mut self.board, self.now);
+        assert_eq!(self.poll(false), Ok(Wish::Wait));
+        assert_eq!(self.poll(true), Ok(Wish::Wait));
+        assert_eq!(self.poll(true), Ok(Wish::Wait));
+        wanted
+    }
+
+    fn asked(&self) -> usize {
+        self.board.link.waiting(Lane::Control)
+    }
+}
+
+#[test]
+fn it_comes_twice_the_second_time_from_near_and_slowly() {
+    let mut table = Table::new("5");
+    let first = table.approach(100);
+    assert_eq!((first.from_mm, first.to_mm, first.speed.0), (450.0, 0.0, 50.0));
+    table.found(-3100).unwrap();
+    let back = table.back_off();
+    assert_eq!((back.from_mm, back.to_mm), (0.0, 5.0));
+    table.endstop(false, false).unwrap();
+    let second = table.approach(-2700);
+    assert_eq!((second.from_mm, second.to_mm, second.speed.0), (10.0, 0.0, 10.0));
+    table.found(-3101).unwrap();
+    assert_eq!(table.poll(true), Ok(Wish::Done));
+    assert_eq!((table.homing.steps, table.homing.position_mm()), (3200 + 401, 0.0));
+}
+
+#[test]
+fn without_a_way_back_once_is_enough() {
+    let mut table = Table::new("0");
+    table.approach(0);
+    table.found(0).unwrap();
+    assert_eq!(table.poll(true), Ok(Wish::Done));
+}
+
+#[test]
+fn a_switch_that_stays_closed_or_closes_without_a_step_is_none() {
+    let mut table = Table::new("5");
+    table.approach(0);
+    table.found(-1).unwrap();
+    table.back_off();
+    assert_eq!(table.endstop(false, true).unwrap_err().code, ErrorCode::EndstopStillTriggered);
+    table.endstop(false, false).unwrap();
+    table.approach(400);
+    assert_eq!(table.found(400).unwrap_err().code, ErrorCode::EndstopBeforeMove);
+}
+
+#[test]
+fn why_an_approach_ended_decides() {
+    for (reason, code) in [
+        (REASON_HOST, ErrorCode::EndstopNotReached),
+        (REASON_EXPIRED, ErrorCode::HomingTimeout),
+        (99, ErrorCode::EndstopNotReached),
+    ] {
+        let mut table = Table::new("5");
+        table.approach(0);
+        table.trigger(true, 0).unwrap();
+        assert_eq!(table.trigger(false, reason).unwrap_err().code, code);
+    }
+}
+
+#[test]
+fn answers_for_others_and_at_other_times_change_nothing() {
+    let mut table = Table::new("5");
+    table.trigger(false, REASON_ENDSTOP).unwrap();
+    table.endstop(false, true).unwrap();
+    table.approach(0);
+    table.homing.on_trigger(77, false, REASON_ENDSTOP, table.now, &mut table.board).unwrap();
+    table.homing.on_endstop(77, false, true, table.now, &mut table.board).unwrap();
+    table.homing.on_position(77, 5).unwrap();
+    table.homing.on_position(table.homing.stepper, 5).unwrap();
+    assert!(matches!(table.homing.stage, Stage::Approach { .. }));
+}
+
+#[test]
+fn a_lost_report_is_asked_for() {
+    let mut table = Table::new("5");
+    table.approach(0);
+    table.now = Seconds(0.36);
+    let before = table.asked();
+    assert_eq!(table.poll(false), Ok(Wish::Wait));
+    // It says that it is there, and asks whether the approach is still on.
+    assert_eq!(table.asked(), before + 2);
+    table.endstop(false, true).unwrap();
+    assert_eq!(table.asked(), before + 3);
+    table.trigger(false, REASON_ENDSTOP).unwrap();
+    assert_eq!(table.poll(false), Ok(Wish::Abandon));
+}
+
+#[test]
+fn nobody_who_answers_is_not_waited_for_without_end() {
+    let mut table = Table::new("5");
+    let mut polls = 0;
+    let error = loop {
+        table.now += Seconds(0.05);
+        polls += 1;
+        if let Err(error) = table.poll(true) {
+            break error;
+        }
+    };
+    assert_eq!(error.code, ErrorCode::HomingTimeout);
+    assert!(table.now.0 < 3.2 && table.asked() < polls / 2);
+}
+
+#[test]
+fn a_cancelled_approach_is_stopped_once_it_moves() {
+    let mut table = Table::new("5");
+    table.approach(0);
+    table.homing.cancel();
+    let before = table.asked();
+    assert_eq!(table.poll(false), Ok(Wish::Wait));
+    assert_eq!(table.asked(), before);
+    table.now = Seconds(0.15);
+    assert_eq!(table.poll(false), Ok(Wish::Wait));
+    assert_eq!(table.asked(), before + 2);
+    table.trigger(false, REASON_HOST).unwrap();
+    assert_eq!(table.poll(false), Ok(Wish::Abandon));
+    assert_eq!(table.poll(true), Ok(Wish::Cancelled));
+}

@@ -1,0 +1,216 @@
+//! Stopping: a job that is paused, cancelled, at its end or has failed, and a machine that nobody uses.
+
+use units::Seconds;
+
+use super::{Held, Ready, Wait};
+use crate::{
+    error::{Ended, ErrorCode, PrinterError},
+    planner::ExtrusionPermit,
+    session::{
+        event::Event,
+        job::{Job, JobState, Paused, RETURN_FEED},
+    },
+};
+
+impl Ready {
+    /// The G-code that is being carried out cannot go on: a job ends with everything off, the console only forgets
+    /// what else it was told.
+    pub(in crate::session) fn source_failed(&mut self, error: PrinterError, now: Seconds) {
+        self.planner.drop_barrier();
+        match &mut self.job {
+            Some(job) if job.is_active() => {
+                if !matches!(job.state, JobState::Failing(_)) {
+                    job.state = JobState::Failing(error.ending(Ended::Job));
+                    self.stop_waiting();
+                    self.switch_off(now);
+                }
+            }
+            _ => {
+                self.forget_console();
+                self.events.push(Event::Error(error));
+            }
+        }
+    }
+
+    /// What was typed and not yet done is not done, and the console knows where the machine will stand.
+    fn forget_console(&mut self) {
+        self.console.clear();
+        self.planner.correct(&mut self.console);
+    }
+
+    fn switch_off(&mut self, now: Seconds) {
+        self.thermal.all_off(&mut self.board, now);
+        self.thermal.set_fan(0.0, None, &mut self.board, now);
+    }
+
+    /// Nothing is waited for any more; an axis that is being homed stops.
+    fn stop_waiting(&mut self) {
+        self.held = Held::default();
+        match &mut self.wait {
+            Wait::Homing { axis, remaining, .. } => {
+                remaining.clear();
+                axis.cancel();
+            }
+            wait => *wait = Wait::Nothing,
+        }
+    }
+
+    pub(in crate::session) fn pause(&mut self, now: Seconds) -> Result<(), PrinterError> {
+        let Some(job) = &mut self.job else { return Err(ErrorCode::NoJob.into()) };
+        if job.state == JobState::Printing {
+            job.state = JobState::Pausing;
+            self.held = Held { wait: self.wait.hold(now), barrier: self.planner.take_barrier() };
+        }
+        Ok(())
+    }
+
+    pub(in crate::session) fn cancel(&mut self, now: Seconds) -> Result<(), PrinterError> {
+        let is_console_busy = self.is_console_busy();
+        match &mut self.job {
+            Some(job) if matches!(job.state, JobState::Failing(_)) => return Ok(()),
+            Some(job) => job.state = JobState::Cancelling,
+            None if is_console_busy => self.forget_console(),
+            None => return Err(ErrorCode::NoJob.into()),
+        }
+        self.planner.drop_barrier();
+        self.stop_waiting();
+        self.switch_off(now);
+        Ok(())
+    }
+
+    /// Goes back to where the job was paused, and on.
+    pub(in crate::session) fn resume(&mut self, now: Seconds) -> Result<(), PrinterError> {
+        let Some(paused) = self.job.as_ref().and_then(|job| job.paused) else {
+            return Err(PrinterError::new(ErrorCode::NoJob, "no job is paused"));
+        };
+        if self.is_console_busy() {
+            return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
+        }
+        let homed = self.planner.guard.homed();
+        if (0..3).any(|axis| paused.homed[axis] && !homed[axis]) {
+            return Err(PrinterError::new(
+                ErrorCode::NotHomed,
+                "the position was lost while the job was paused",
+            ));
+        }
+        if let (true, ExtrusionPermit::TooCold { celsius }) = (paused.could_extrude, self.extrusion_permit())
+        {
+            let detail = format!("the nozzle has cooled to {celsius:.0} °C while the job was paused");
+            return Err(PrinterError::new(ErrorCode::ColdExtrusion, detail));
+        }
+        self.go_back(&paused)?;
+        let Some(job) = &mut self.job else { return Err(ErrorCode::NoJob.into()) };
+        let filament_mm = self.planner.position()[3] - paused.position[3];
+        self.planner.rejoin(&mut job.source, filament_mm);
+        job.state = JobState::Printing;
+        job.paused = None;
+        let Held { wait, barrier } = core::mem::take(&mut self.held);
+        self.wait = wait.go_on(now);
+        self.planner.put_barrier(barrier);
+        self.events.push(Event::Resumed);
+        Ok(())
+    }
+
+    /// Across first, at the greater height, then down: nothing is hit on the way. The filament stays as it is, and so
+    /// does an axis whose position was not known then.
+    fn go_back(&mut self, paused: &Paused) -> Result<(), PrinterError> {
+        let here = self.planner.position();
+        let [x, y, z] =
+            core::array::from_fn(|axis| if paused.homed[axis] { paused.position[axis] } else { here[axis] });
+        let (up, e) = (here[2].max(z), here[3]);
+        for to in [[here[0], here[1], up, e], [x, y, up, e], [x, y, z, e]] {
+            self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
+        }
+        Ok(())
+    }
+
+    /// What is done once the machine is at rest: a job that was told to stop has stopped, and a machine that nobody
+    /// uses is switched off.
+    pub(super) fn rest(&mut self, now: Seconds) {
+        if !self.is_at_rest() || !matches!(self.wait, Wait::Nothing) {
+            self.last_active = now;
+            return;
+        }
+        let state = self.job.as_ref().map(|job| job.state.clone());
+        match state {
+            Some(JobState::Pausing) => self.is_paused(now),
+            Some(JobState::Cancelling) => self.end_job(Event::JobCancelled, now),
+            Some(JobState::Failing(error)) => self.end_job(Event::Error(error), now),
+            Some(JobState::Printing) => {}
+            Some(JobState::Paused) | None => self.idle(now),
+        }
+    }
+
+    fn is_paused(&mut self, now: Seconds) {
+        let paused = Paused {
+            position: self.planner.position(),
+            homed: self.planner.guard.homed(),
+            could_extrude: self.extrusion_permit() == ExtrusionPermit::Allowed,
+        };
+        if let Some(job) = &mut self.job {
+            job.state = JobState::Paused;
+            job.paused = Some(paused);
+        }
+        self.last_active = now;
+        self.console.clear();
+        self.planner.adopt(&mut self.console);
+        self.events.push(Event::Paused);
+    }
+
+    /// A job that ends early leaves everything off.
+    fn end_job(&mut self, event: Event, now: Seconds) {
+        self.switch_off(now);
+        self.forget_job(event);
+    }
+
+    fn forget_job(&mut self, event: Event) {
+        self.job = None;
+        self.held = Held::default();
+        self.planner.drop_barrier();
+        self.console.clear();
+        self.planner.adopt(&mut self.console);
+        self.events.push(event);
+    }
+
+    /// The job's file has been carried out to its end.
+    pub(super) fn finish_job(&mut self, now: Seconds) {
+        let error = self.job.as_ref().and_then(wrong_at_end);
+        match error {
+            Some(error) => self.source_failed(error, now),
+            None => self.forget_job(Event::JobDone),
+        }
+    }
+
+    /// Nobody has used the machine for a while. A paused job keeps its motors on, so that it can be resumed once the
+    /// user has heated again.
+    fn idle(&mut self, now: Seconds) {
+        if now - self.last_active < self.config.idle_timeout.timeout {
+            return;
+        }
+        self.last_active = now;
+        let heats = self.thermal.any_target();
+        if self.job.is_some() {
+            if heats {
+                self.thermal.all_off(&mut self.board, now);
+                self.events.push(Event::Message("paused for too long: heaters are off".into()));
+            }
+        } else if heats || self.stream.any_enabled() {
+            self.thermal.all_off(&mut self.board, now);
+            self.stream.disable([true; 4], &mut self.board, now);
+            (0..3).for_each(|axis| self.planner.guard.set_homed(axis, false));
+            self.events.push(Event::Message("idle for too long: heaters and motors are off".into()));
+        }
+    }
+}
+
+/// What is wrong with a job whose file ends as it does.
+fn wrong_at_end(job: &Job) -> Option<PrinterError> {
+    let line = job.source.line().0;
+    if !job.has_moved {
+        return Some(PrinterError::new(ErrorCode::FileEmpty, "the file made no move"));
+    }
+    // Whoever wants the nozzle to stay hot confirms the last line, as with everything that looks wrong.
+    let is_cut_off = job.leaves_hot && !job.is_confirmed(line);
+    let detail = "it ended with the nozzle still hot";
+    is_cut_off.then(|| PrinterError::new(ErrorCode::FileCutOff, detail).at_line(line))
+}

@@ -1,0 +1,10 @@
+//! Whole sessions against the virtual printer: what is asked for happens, and whatever goes wrong ends with its own
+//! error and a machine that is safe.
+
+mod bench;
+mod console;
+mod faults;
+mod link;
+mod machine;
+mod print;
+mod stopping;
