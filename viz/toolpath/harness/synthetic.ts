@@ -91,6 +91,18 @@ function zigzag(
   }
 }
 
+/** Three walls, the outer one last. */
+function walls(out: Writer, loop: (insetMm: number) => [number, number][]): void {
+  for (let wall = 2; wall >= 0; wall--) out.loop(loop(wall * 0.42), wall === 0 ? 'outerWall' : 'innerWall');
+}
+
+function box(out: Writer, layer: number, layers: number): void {
+  walls(out, (inset) => square(110 + inset, 50 + inset, 150 - inset, 100 - inset));
+  const solid = layer < 3 || layer >= layers - 3;
+  const feature = layer === layers - 1 ? 'topSurface' : solid ? 'solidInfill' : 'infill';
+  zigzag(out, 111.4, 51.4, 148.6, 98.6, solid ? 0.42 : 2.4, feature);
+}
+
 /** About so many segments. */
 export function synthetic(segments: number): Synthetic {
   const out = new Writer();
@@ -102,21 +114,8 @@ export function synthetic(segments: number): Synthetic {
   for (let layer = 0; layer < count; layer++) {
     layers.push({ firstVertex: layer === 0 ? 0 : out.count, zMm: out.z });
     out.layer = layer;
-    for (let wall = 2; wall >= 0; wall--) {
-      out.loop(vase(60, 75, 28 - wall * 0.42, out.z, sides), wall === 0 ? 'outerWall' : 'innerWall');
-    }
-    if (layer < boxLayers) {
-      for (let wall = 2; wall >= 0; wall--) {
-        const inset = wall * 0.42;
-        out.loop(
-          square(110 + inset, 50 + inset, 150 - inset, 100 - inset),
-          wall === 0 ? 'outerWall' : 'innerWall',
-        );
-      }
-      const solid = layer < 3 || layer >= boxLayers - 3;
-      const feature = layer === boxLayers - 1 ? 'topSurface' : solid ? 'solidInfill' : 'infill';
-      zigzag(out, 111.4, 51.4, 148.6, 98.6, solid ? 0.42 : 2.4, feature);
-    }
+    walls(out, (inset) => vase(60, 75, 28 - inset, out.z, sides));
+    if (layer < boxLayers) box(out, layer, boxLayers);
     out.z += LAYER_MM;
   }
   return { vertices: out.words.slice(0, out.count * WORDS_PER_VERTEX), layers };

@@ -11,7 +11,7 @@ export const FRAME_TARGET_MS: Ms = 36;
 const SEGMENTS_FEW = 1_000;
 /** However slow the machine: fewer would no longer look like the part. */
 const SEGMENTS_MIN = 8_000;
-const SEGMENTS_START = 40_000;
+const SEGMENTS_START = 16_000;
 /** More than any file: 2²⁶ vertices are 1 GiB. */
 const SEGMENTS_MAX = 1 << 26;
 /** The budget may grow so much from one go to the next: a single lucky measurement must not freeze the view. */

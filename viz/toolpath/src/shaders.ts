@@ -62,7 +62,7 @@ vec3 lit(vec3 colour, vec3 towards) {
   float key = max(dot(n, KEY), 0.0);
   float fill = max(dot(n, FILL), 0.0);
   float shine = pow(max(dot(n, GLANCE), 0.0), 24.0);
-  return colour * (0.34 + 0.62 * key + 0.18 * fill) + 0.04 * shine;
+  return colour * (0.43 + 0.52 * key + 0.22 * fill) + 0.04 * shine;
 }
 `;
 
@@ -87,7 +87,11 @@ ${LIGHT}
 const float SIZE_STEP = ${SIZE_STEP_MM};
 /** Cosine of the sharpest bend that is mitred. */
 const float MITRE_COS_MIN = -0.5;
+/** Cosine of the sharpest bend that looks round. */
+const float ROUND_COS_MIN = 0.85;
 const float TIP = 0.8;
+/** A bead that stands for several layers is so much higher, so that no gaps are left between round edges. */
+const float OVERLAP = 1.3;
 /** Features whose beads lie on top of each other; the others' lie side by side. */
 const uint WALLS = ${WALLS}u;
 
@@ -98,6 +102,12 @@ vec2 sizeOf(uvec4 v) {
   float width = float((v.x >> ${FIELDS.width.shift}) & ${mask(FIELDS.width.bits)}) * SIZE_STEP;
   float height = float((v.y >> ${FIELDS.height.shift}) & ${mask(FIELDS.height.bits)}) * SIZE_STEP;
   return vec2(width > 0.0 ? width : uDefaultSize.x, height > 0.0 ? height : uDefaultSize.y);
+}
+
+/** Level and across the way; any such direction where the way is upright. */
+vec3 rightOf(vec3 way) {
+  float level = length(way.xy);
+  return level > 1e-4 ? vec3(way.y, -way.x, 0.0) / level : vec3(1.0, 0.0, 0.0);
 }
 
 void main() {
@@ -128,12 +138,15 @@ void main() {
   float otherLen = length(other);
   vec2 size = sizeOf(own);
   vec3 tangent = along;
+  vec3 lightTangent = along;
   float mitre = 1.0;
   bool joined = false;
   if (shown(neighbour) && otherLen > 1e-6) {
     float bend = dot(along, other / otherLen);
     if (bend > MITRE_COS_MIN) {
       joined = true;
+      // Round a bend the light turns with it; a corner keeps its edge.
+      if (bend > ROUND_COS_MIN) lightTangent = along + other / otherLen;
       tangent = normalize(along + other / otherLen);
       mitre = 1.0 / max(dot(tangent, along), 0.5);
       size = 0.5 * (size + sizeOf(neighbour));
@@ -142,11 +155,10 @@ void main() {
 
   vec3 here = atEnd ? to : from;
   // A bead that stands for the layers below it reaches down to them, but not through the bed.
-  float height = uHeightScale > 1.0 ? min(size.y * uHeightScale, max(here.z - uBedZ, size.y)) : size.y;
+  float height = uHeightScale > 1.0 ? min(size.y * uHeightScale * OVERLAP, max(here.z - uBedZ, size.y)) : size.y;
   vec2 half_ = 0.5 * vec2(size.x, height);
   vec3 centre = here - vec3(0.0, 0.0, half_.y);
-  float flat_ = length(tangent.xy);
-  vec3 right = flat_ > 1e-4 ? vec3(tangent.y, -tangent.x, 0.0) / flat_ : vec3(1.0, 0.0, 0.0);
+  vec3 right = rightOf(tangent);
   vec3 up = cross(right, tangent);
 
   // The ellipse as a unit circle: the outline is where the normal is across the line of sight.
@@ -154,7 +166,8 @@ void main() {
   vec2 q = vec2(dot(sight, right), dot(sight, up)) / half_;
   q = length(q) > 1e-6 ? normalize(q) : vec2(0.0, 1.0);
   vec2 c = part == 0 ? vec2(-q.y, q.x) : part == 2 ? vec2(q.y, -q.x) : part == 3 ? -q : q;
-  vec3 round_ = normalize(right * (c.x / half_.x) + up * (c.y / half_.y));
+  vec3 lightRight = rightOf(lightTangent);
+  vec3 round_ = normalize(lightRight * (c.x / half_.x) + up * (c.y / half_.y));
   vec3 place = centre + right * (c.x * half_.x * mitre) + up * (c.y * half_.y);
   if (part == 4) {
     vec3 outward = atEnd ? along : -along;
@@ -164,11 +177,12 @@ void main() {
 
   // Beads about as thin as a pixel would glitter: far away each has the one normal of the surface it is part of.
   float pixel = uPixelAngle * length(sight);
-  vec2 seen = vec2(dot(sight, right), dot(sight, up)) / length(sight);
+  vec3 lightUp = cross(lightRight, normalize(lightTangent));
+  vec2 seen = vec2(dot(sight, lightRight), dot(sight, lightUp)) / length(sight);
   bool wall = ((WALLS >> featureOf(own)) & 1u) == 1u;
   vec2 lean = wall ? vec2(clamp(seen.x * 5.0, -1.0, 1.0), 0.4 * seen.y) : vec2(0.15 * seen.x, clamp(seen.y * 8.0, -1.0, 1.0));
-  vec3 surface = normalize(right * lean.x + up * lean.y + 1e-3 * sight / length(sight));
-  vec3 normal = mat3(viewMatrix) * mix(round_, surface, smoothstep(0.25, 0.8, pixel / min(size.x, height)));
+  vec3 surface = normalize(lightRight * lean.x + lightUp * lean.y + 1e-3 * sight / length(sight));
+  vec3 normal = mat3(viewMatrix) * mix(round_, surface, uHeightScale > 1.0 ? 0.8 : smoothstep(0.2, 0.6, pixel / min(size.x, height)));
   vec3 colour = uPalette[featureOf(own)];
   vColour = uBase + uint(bead * uStride) < uPrinted ? colour : mix(colour, uRemaining, 0.84);
 #ifdef LIT_AT_CORNERS

@@ -145,6 +145,11 @@ export class Stage {
     this.#picture.dispose();
   }
 
+  /** The context is lost: lets go of its buffers, which come anew when they are next used. */
+  lost(): void {
+    this.#picture.dispose();
+  }
+
   /** Shows the full picture. */
   present(): void {
     this.#aim('canvas');

@@ -234,10 +234,18 @@ export class ToolpathView {
 
   readonly #onLost = (): void => {
     this.#loop.pause();
+    // What was on the GPU is gone; what belongs to it here goes too and is made anew from the store.
+    this.#fine.clear();
+    this.#coarse.clear();
+    this.#bedObjects.clear();
+    this.#stage.lost();
     this.#events.onContextLost?.();
   };
 
   readonly #onRestored = (): void => {
+    if (this.#bed) this.#bedObjects.set(this.#bed);
+    this.#bedObjects.palette = this.#palette;
+    this.#stage.background = this.#palette.background;
     this.#loop.resume();
     this.#events.onContextRestored?.();
   };

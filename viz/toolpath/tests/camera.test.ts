@@ -1,5 +1,14 @@
 import { describe, expect, test } from 'vitest';
-import { clipPlanes, DEFAULT_CAMERA, eyeFrame, fit, orbit, pan, type Vec3, zoom } from '../src/camera';
+import {
+  clipPlanes,
+  DEFAULT_CAMERA,
+  eyeFrame,
+  fit as fitted,
+  orbit,
+  pan,
+  type Vec3,
+  zoom,
+} from '../src/camera';
 
 const SIZE = { width: 800, height: 600 };
 const BOX = { min: [10, 20, 0], max: [110, 90, 40] } as const;
@@ -61,7 +70,7 @@ describe('the camera', () => {
       [-2, 1.4],
       [3, -0.3],
     ] as const) {
-      const camera = fit({ ...DEFAULT_CAMERA, azimuth, elevation }, BOX, SIZE);
+      const camera = fitted({ ...DEFAULT_CAMERA, azimuth, elevation }, BOX, SIZE);
       let fullest = 0;
       for (const x of [BOX.min[0], BOX.max[0]])
         for (const y of [BOX.min[1], BOX.max[1]])
@@ -75,7 +84,7 @@ describe('the camera', () => {
   });
 
   test('the clip planes hold the box', () => {
-    const camera = fit(DEFAULT_CAMERA, BOX, SIZE);
+    const camera = fitted(DEFAULT_CAMERA, BOX, SIZE);
     const { nearMm, farMm } = clipPlanes(camera, BOX);
     expect(nearMm).toBeGreaterThan(0);
     expect(farMm).toBeGreaterThan(nearMm);

@@ -146,6 +146,6 @@ describe('the budget', () => {
     const budget = new DetailBudget();
     budget.measured(Number.NaN, 5);
     budget.measured(5_000, Number.NaN);
-    expect(budget.segments).toBe(40_000);
+    expect(budget.segments).toBe(16_000);
   });
 });
