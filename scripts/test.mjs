@@ -50,7 +50,7 @@ const steps = [
   {
     name: 'WebAssembly equals native',
     needs: ['release build'],
-    commands: [['cargo', 'xtask', 'wasm'], nodeTests('wasm.test.mjs')],
+    commands: [['cargo', 'xtask', 'wasm'], nodeTests('wasm.test.mjs', 'wasm_session.test.mjs')],
   },
   { name: 'messages as TypeScript', commands: [['cargo', 'xtask', 'bindings', '--check']] },
   { name: 'biome', commands: [packaged('@biomejs/biome/bin/biome', 'check', '--error-on-warnings')] },

@@ -43,10 +43,9 @@ fn main() {
 }
 
 fn units() -> File {
-    let mut text = String::from("declare const unit: unique symbol;\n");
-    for (_, name, unit) in UNITS {
-        text += &format!("export type {name} = number & {{ readonly [unit]?: '{unit}' }};\n");
-    }
+    let lines = UNITS
+        .map(|(_, name, unit)| format!("export type {name} = number & {{ readonly [unit]?: '{unit}' }};\n"));
+    let text = format!("declare const unit: unique symbol;\n{}", lines.concat());
     File { name: "units".to_owned(), text }
 }
 

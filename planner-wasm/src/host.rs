@@ -28,6 +28,9 @@ const MOVES_MAX: usize = 16_384;
 /// Numbers that describe a move: line, start and end (host time, s), from x y z e, to x y z e (mm).
 pub const MOVE_NUMBERS: usize = 11;
 
+/// Moves that overlap by no more follow each other: rounding.
+const TICKS_SLACK: Ticks = Ticks(1000);
+
 /// A session with a memory.
 pub struct Host {
     session: Session,
@@ -156,8 +159,15 @@ impl Host {
             }
             Event::Move(mv) => {
                 push_bounded(&mut self.moves, *mv);
+                // A homing move that the next one overlaps was cut short by its endstop.
+                while self
+                    .ahead
+                    .pop_back_if(|last| last.homing && last.end > mv.start + TICKS_SLACK)
+                    .is_some()
+                {}
                 push_bounded(&mut self.ahead, *mv);
             }
+            Event::Homed { .. } => self.ahead.retain(|mv| !mv.homing),
             Event::Temperature { .. } => {
                 if let Some(UiEvent::Temperature { heater, temperature_c, target_c, duty }) =
                     UiEvent::of(event)
@@ -340,4 +350,99 @@ impl PrinterSession {
 
 fn unreadable(error: &serde_json::Error) -> JsError {
     thrown(&PrinterError::new(ErrorCode::Internal, format!("a request of the page cannot be read: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Simulation, messages::PhaseLabel};
+    use printer::config::parse;
+
+    fn machine() -> PrinterConfig {
+        parse(demo_machine::USUAL_MACHINE).0.unwrap()
+    }
+
+    /// Lets a host and a printer run until a time, or until an event is seen.
+    fn run(host: &mut Host, printer: &mut Simulation, until: f64, seen: impl Fn(&UiEvent) -> bool) -> bool {
+        let (mut to_board, mut to_host) = (Vec::new(), Vec::new());
+        while printer.now().0 < until {
+            let now = printer.now();
+            let wake = host.poll(now, &mut to_board);
+            printer.write(&to_board);
+            to_board.clear();
+            if host.take_events().iter().any(&seen) {
+                return true;
+            }
+            printer.run_until(wake.max(now + Seconds(50e-6)).min(Seconds(until)), &mut to_host);
+            host.receive(&to_host, printer.now());
+            to_host.clear();
+        }
+        false
+    }
+
+    #[test]
+    fn a_snapshot_follows_the_machine() {
+        let mut printer = Simulation::new(machine(), None, 1, "").unwrap();
+        let mut host = Host::new(machine(), printer.now());
+        let before = host.snapshot(printer.now());
+        assert_eq!((before.phase, before.board, before.live_mm), (PhaseLabel::Identifying, None, None));
+        let ready = |event: &UiEvent| *event == UiEvent::Phase { phase: PhaseLabel::Ready };
+        assert!(run(&mut host, &mut printer, 20.0, ready));
+        host.request(UiRequest::Home { axes: Vec::new() }, printer.now()).unwrap();
+        assert!(run(&mut host, &mut printer, 120.0, |event| matches!(event, UiEvent::Homed { axis: 2, .. })));
+        let settled = printer.now().0 + 3.0;
+        run(&mut host, &mut printer, settled, |_| false);
+        host.take_moves(printer.now());
+
+        let text = "G90\nG1 X100 Y50 F600".to_owned();
+        host.request(UiRequest::Gcode { text }, printer.now()).unwrap();
+        host.request(UiRequest::SetFan { speed: 0.5 }, printer.now()).unwrap();
+        host.request(UiRequest::SetSpeedFactor { factor: 0.8 }, printer.now()).unwrap();
+        let halfway = printer.now().0 + 5.0;
+        run(&mut host, &mut printer, halfway, |_| false);
+        let now = printer.now();
+        let snapshot = host.snapshot(now);
+        let (live, end) = (snapshot.live_mm.unwrap(), snapshot.position_mm.unwrap());
+        assert!((end[0] - 100.0).abs() < 1e-9 && (end[1] - 50.0).abs() < 1e-9);
+        assert!(live[0] > 10.0 && live[0] < 90.0, "{live:?}");
+        assert!((live[0] - 2.0 * live[1]).abs() < 1e-6, "{live:?}");
+        let truly = printer.state();
+        assert!((truly.motors[0].position_mm - live[0]).abs() < 1.0, "{live:?} {truly:?}");
+        assert_eq!((snapshot.homed, snapshot.speed_factor), ([true; 3], 0.8));
+        assert!((snapshot.fan - 0.5).abs() < 0.01);
+        assert!(snapshot.link.unwrap().received_bytes > 1000);
+        assert_eq!(snapshot.temperatures.len(), 2);
+
+        let moves = host.take_moves(now);
+        assert_eq!(moves.len(), MOVE_NUMBERS);
+        let (start, stop) = (moves[1], moves[2]);
+        assert!(start < now.0 && now.0 < stop && stop - start > 11.0, "{moves:?}");
+        assert_eq!(moves[7..9], [100.0, 50.0]);
+        assert_eq!(host.take_moves(now), Vec::<f64>::new());
+
+        host.request(UiRequest::EmergencyStop, now).unwrap();
+        let stopped = host.snapshot(now);
+        assert_eq!((stopped.phase, stopped.live_mm), (PhaseLabel::Shutdown, None));
+        assert!(stopped.error.is_some());
+    }
+
+    #[test]
+    fn what_nobody_takes_is_bounded_and_counted() {
+        let mut host = Host::new(machine(), Seconds(0.0));
+        assert_eq!(host.events.len(), 0);
+        host.events.extend((0..EVENTS_MAX + 9).map(|_| UiEvent::Paused));
+        host.sort_events();
+        let events = host.take_events();
+        assert_eq!(events.len(), EVENTS_MAX + 1);
+        // The session's own first event is among those that stay.
+        assert_eq!(events.last(), Some(&UiEvent::Dropped { count: 10 }));
+        assert_eq!(host.take_events(), []);
+        for _ in 0..MOVES_MAX + 9 {
+            let still = [0.0; 4];
+            let (start, end) = (Ticks(0), Ticks(1));
+            let mv = ScheduledMove { line: 1, start, end, from: still, to: still, homing: false };
+            host.remember(&Event::Move(mv));
+        }
+        assert_eq!((host.moves.len(), host.ahead.len()), (MOVES_MAX, MOVES_MAX));
+    }
 }

@@ -4,6 +4,9 @@
 //! else as JSON in the shapes of [`messages`]. What fails is thrown as an `Error` whose message is a `PrinterError` as
 //! JSON. Time is an argument, in seconds; nothing here reads a clock.
 
+// wasm-bindgen hands optional texts over by value.
+#![allow(clippy::needless_pass_by_value)]
+
 mod host;
 pub mod messages;
 mod plan;

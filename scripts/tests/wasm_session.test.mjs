@@ -77,7 +77,7 @@ class Pair {
     }
   }
 
-  /** Lets time pass until `done` says so; a minute of it at a time is an hour of virtual time at most. */
+  /** Lets virtual time pass until `done` says so. */
   runUntil(done, limitS = 3600) {
     const end = this.printer.now_s() + limitS;
     this.attend();
@@ -153,8 +153,9 @@ for (const board of ['rp2040', 'stm32f103']) {
     assert.deepEqual(made, planned(tiny));
     assert.ok(made.every((steps) => steps > 0), `${made}`);
     assert.ok(after.motors.every((motor) => motor.lost_steps === 0));
+    // Switches close a step or two from where they should.
     [110, 110, 0.8].forEach((end, axis) => {
-      assert.ok(Math.abs(after.motors[axis].position_mm - end) < 0.02, `${axis}: ${after.motors[axis].position_mm}`);
+      assert.ok(Math.abs(after.motors[axis].position_mm - end) < 0.05, `${axis}: ${after.motors[axis].position_mm}`);
     });
     assert.equal(after.shutdown, null);
     const snapshot = pair.snapshot();
@@ -203,7 +204,7 @@ function preview(gcode, printerCfg) {
     for (let some = reader.take_vertices(); some.length > 0; some = reader.take_vertices()) words.push(some);
   };
   for (let at = 0; at < gcode.length; ) {
-    const end = at + Math.min(reader.wants(), 65_536);
+    const end = Math.min(gcode.length, at + Math.min(reader.wants(), 65_536));
     reader.feed(gcode.subarray(at, end));
     at = end;
     take();

@@ -99,8 +99,8 @@ impl From<UiRequest> for Request {
             UiRequest::SetSpeedFactor { factor } => Self::SetSpeedFactor(factor),
             UiRequest::SetFlowFactor { factor } => Self::SetFlowFactor(factor),
             UiRequest::Home { axes } => {
-                let words: String = axes.iter().map(|axis| format!(" {}", letter(*axis))).collect();
-                Self::Gcode(format!("G28{words}"))
+                let words = axes.iter().flat_map(|axis| [' ', letter(*axis)]);
+                Self::Gcode("G28".chars().chain(words).collect())
             }
             UiRequest::Jog { axis, distance_mm, speed_mm_s } => {
                 Self::Gcode(relative_move(letter(axis), distance_mm, speed_mm_s))

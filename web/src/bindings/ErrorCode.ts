@@ -17,6 +17,7 @@ export type ErrorCode =
   | 'endstop-still-triggered'
   | 'endstop-before-move'
   | 'homing-timeout'
+  | 'step-rate-too-high'
   | 'unknown-command'
   | 'invalid-gcode'
   | 'file-empty'
@@ -47,5 +48,6 @@ export type ErrorCode =
   | 'board-pin-refused'
   | 'board-shutdown'
   | 'busy-printing'
+  | 'no-job'
   | 'not-connected'
   | 'internal';

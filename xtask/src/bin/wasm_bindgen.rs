@@ -13,7 +13,8 @@ fn main() -> Result<()> {
     let mut node = Bindgen::new();
     node.nodejs(true)?;
     let mut web = Bindgen::new();
-    web.web(true)?;
+    // Functions' names are a tenth of what travels to the browser; those for Node keep them for traces.
+    web.web(true)?.remove_name_section(true).remove_producers_section(true);
     for (mut bindgen, name) in [(node, "node"), (web, "web")] {
         bindgen
             .input_path(&module)

@@ -200,7 +200,7 @@ fn arcs_are_flattened_and_bounded() {
     let grid = Grid::around(None);
     for vertex in &found[1..] {
         let [x, y, _] = grid.place(vertex.steps);
-        assert!((x.hypot(y) - 10.0).abs() < 2.0 * grid.step_mm);
+        assert!((libm::hypot(x, y) - 10.0).abs() < 2.0 * grid.step_mm);
     }
     // A hundred turns of a kilometre: far more than may be made at once.
     let mut preview = Preview::new(None);
@@ -244,12 +244,15 @@ fn wide(text: &str) -> String {
 
 #[test]
 fn without_a_slicers_comments_height_tells_layers_and_width() {
-    let mut text = String::from("G90\nM83\nG1 Z0.2 F6000\n");
-    for layer in 0..5 {
-        let z = 0.2 * f64::from(layer + 1);
-        // A hop in between is no layer.
-        text += &format!("G1 Z{:.2}\nG1 X0 Y0\nG1 Z{z:.2}\nG1 X100 E3.326\nG1 Y50 E1.663\n", z + 0.6);
-    }
+    let layers: Vec<String> = (1..=5)
+        .map(|layer| {
+            let z = 0.2 * f64::from(layer);
+            // A hop in between is no layer.
+            let hop = z + 0.6;
+            format!("G1 Z{hop:.2}\nG1 X0 Y0\nG1 Z{z:.2}\nG1 X100 E3.326\nG1 Y50 E1.663\n")
+        })
+        .collect();
+    let text = format!("G90\nM83\nG1 Z0.2 F6000\n{}", layers.concat());
     let (found, _, preview) = read(text.as_bytes(), None, usize::MAX);
     let report = preview.finish();
     let heights: Vec<f64> = report.layers.iter().map(|layer| (layer.z.0 * 100.0).round() / 100.0).collect();
