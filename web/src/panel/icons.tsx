@@ -14,7 +14,7 @@ const PATHS = {
   plug: 'M9 3v5M15 3v5M7 8h10v4a5 5 0 0 1-10 0zM12 17v4',
   play: 'M8 5l11 7-11 7z',
   pause: 'M9 5v14M15 5v14',
-  stop: 'M6 6h12v12H6z',
+  stop: 'M8.3 3h7.4L21 8.3v7.4L15.7 21H8.3L3 15.7V8.3zM9 12h6',
   check: 'M5 13l4 4L19 7',
   warning: 'M12 4l9 16H3zM12 10v4M12 17v.5',
   machine: 'M3 20h18M6 20V4h12v16M6 9h12M10 9v4h4V9M12 13v2.5',

@@ -48,8 +48,6 @@ function cancel(): void {
 function Facts(): JSX.Element | null {
   const facts = summary.value;
   if (!facts) return null;
-  const { bounds } = facts;
-  const size = bounds?.max.map((max, axis) => formatNumber(max - (bounds.min[axis] ?? 0), 1)).join(' × ');
   return (
     <dl class="facts">
       {facts.time !== null && (
@@ -66,12 +64,6 @@ function Facts(): JSX.Element | null {
         <dt>Layers</dt>
         <dd>{formatNumber(facts.layers.length)}</dd>
       </div>
-      {size && (
-        <div>
-          <dt>Size</dt>
-          <dd>{size} mm</dd>
-        </div>
-      )}
     </dl>
   );
 }

@@ -1,7 +1,7 @@
 // Moving by hand: position, home, jog, extrude, motors off.
 import type { JSX } from 'preact';
 import type { Axis } from '../machine/protocol';
-import { isReady, mayMove, snapshot, wish } from '../state/machine';
+import { isReady, isShutdown, mayMove, snapshot, wish } from '../state/machine';
 import { change, JOG_STEPS, settings } from '../state/settings';
 import { mm } from '../units';
 import { machineSummary } from './machine_summary';
@@ -97,6 +97,7 @@ function JogPad(): JSX.Element {
 }
 
 function reason(): string | null {
+  if (isShutdown.value) return 'The board has stopped: restart it first.';
   if (!isReady.value) return 'Connect a printer to move it.';
   if (!mayMove.value) return 'While a print runs, the print moves the head. Pause it to move by hand.';
   if (!(snapshot.value?.homed ?? []).every(Boolean))

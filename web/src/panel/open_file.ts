@@ -1,6 +1,6 @@
 // Taking files that are dropped or picked. What is in them is judged by the planner, not by their names.
 
-import sampleUrl from '../../../samples/test-part-small.gcode?url';
+import sampleUrl from '../../../samples/test-part.gcode?url';
 import { openFile } from '../state/preview';
 
 export const ACCEPTED = '.gcode,.gco,.g,.gz,.nc,.txt,text/x.gcode';
@@ -17,10 +17,10 @@ export function pickFile(): void {
   input.click();
 }
 
-/** Opens the small test part that is shipped. */
+/** Opens the test part that is shipped. */
 export async function openSample(): Promise<void> {
   const response = await fetch(sampleUrl);
-  if (response.ok) openFile(await response.blob(), 'test-part-small.gcode');
+  if (response.ok) openFile(await response.blob(), 'test-part.gcode');
 }
 
 /** The first file of a drop. */

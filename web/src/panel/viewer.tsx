@@ -32,6 +32,27 @@ function sizeOf(canvas: HTMLElement): { width: number; height: number; ratio: nu
   };
 }
 
+/** How often the view is told what has been printed: the picture is drawn anew for it. */
+const PRINTED_MS = 1000;
+
+/** Tells the printed part from the rest while printing; returns what ends that. */
+function followPrint(host: ToolpathHost): () => void {
+  const tell = (): void => {
+    const now = snapshot.peek();
+    host.setPrintedUpTo(isPrinting.peek() && now ? printedVertex(now) : null);
+  };
+  let timer: ReturnType<typeof setInterval> | undefined;
+  const end = effect(() => {
+    clearInterval(timer);
+    timer = isPrinting.value ? setInterval(tell, PRINTED_MS) : undefined;
+    tell();
+  });
+  return () => {
+    clearInterval(timer);
+    end();
+  };
+}
+
 /** Lets the view follow the page's state; returns what ends that. */
 function follow(host: ToolpathHost): () => void {
   setSink({
@@ -40,10 +61,12 @@ function follow(host: ToolpathHost): () => void {
     finish: ({ layers }) => {
       host.setLayers(layers.map(({ first, z }) => ({ firstVertex: first, zMm: z })));
       host.end();
+      host.fit();
     },
     clear: () => {
       topLayer.value = null;
       host.clear();
+      host.fit();
     },
   });
   const ends = [
@@ -54,9 +77,10 @@ function follow(host: ToolpathHost): () => void {
     }),
     effect(() => {
       const axes = machineSummary.value?.axes;
-      const [x, y, z] = axes ?? [];
-      if (!x || !y || !z) return;
-      host.setBed({ minMm: [x.min, y.min], maxMm: [x.max, y.max], heightMm: z.max });
+      const [x, y] = axes ?? [];
+      if (!x || !y) return;
+      host.setBed({ minMm: [x.min, y.min], maxMm: [x.max, y.max] });
+      if (!file.peek()) host.fit();
     }),
     effect(() => {
       host.show({
@@ -65,9 +89,7 @@ function follow(host: ToolpathHost): () => void {
         layerTo: topLayer.value ?? Number.MAX_SAFE_INTEGER,
       });
     }),
-    effect(() =>
-      host.setPrintedUpTo(isPrinting.value && snapshot.value ? printedVertex(snapshot.value) : null),
-    ),
+    followPrint(host),
   ];
   return () => {
     for (const end of ends) end();
