@@ -3,6 +3,7 @@ import { render } from 'preact';
 import './styles/base.css';
 import './styles/controls.css';
 import './styles/layout.css';
+import './styles/job.css';
 import './styles/panels.css';
 import { App } from './panel/app';
 import { guardPrint } from './panel/guard';

@@ -76,8 +76,9 @@ function hold(
       over = true;
       clearInterval(timer);
       connection = undefined;
-      await parts.stop();
+      // While there still is a clock to ask: stopping lets go of the virtual printer.
       parts.machine.tell(parts.now());
+      await parts.stop();
       parts.machine.free();
       tell({ kind: 'closed', trouble });
       resolve();

@@ -50,8 +50,10 @@ export function App(): JSX.Element {
   const isOver = useDrop();
   return (
     <>
-      <TopBar />
-      <TroubleBanner />
+      <div class="page-head">
+        <TopBar />
+        <TroubleBanner />
+      </div>
       <main class="layout">
         <div class="stage">
           <Viewer />

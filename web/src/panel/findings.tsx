@@ -9,18 +9,36 @@ import { formatNumber } from './numbers';
 
 /** Longer lists help nobody; the rest is counted. */
 const SHOWN_MAX = 100;
+/** Of errors of one kind. */
+const ALIKE_MAX = 3;
+/** As many as the check keeps. */
+const ERRORS_MAX = 1000;
 
 const lineText = (line: number | null): string => (line ? `Line ${formatNumber(line)}` : 'The file');
+
+/** The same thing wrong in many lines is one thing to do. */
+function groups(errors: readonly Trouble[]): Trouble[][] {
+  const byCode = new Map<string, Trouble[]>();
+  for (const error of errors) byCode.set(error.code, [...(byCode.get(error.code) ?? []), error]);
+  return [...byCode.values()];
+}
 
 function Errors({ errors }: { readonly errors: readonly Trouble[] }): JSX.Element {
   return (
     <ul class="findings bad" aria-label="What stops the print">
-      {errors.slice(0, SHOWN_MAX).map((error, index) => (
-        <li key={index}>
+      {groups(errors.slice(0, ERRORS_MAX)).map((group) => (
+        <li key={group[0]?.code}>
           <Icon name="warning" />
           <div>
-            <p class="finding-what">{error.happened}</p>
-            <p>{error.todo}</p>
+            {group.slice(0, ALIKE_MAX).map((error) => (
+              <p class="finding-what" key={error.happened}>
+                {error.happened}
+              </p>
+            ))}
+            {group.length > ALIKE_MAX && (
+              <p class="finding-what">and {formatNumber(group.length - ALIKE_MAX)} more lines like these.</p>
+            )}
+            <p>{group[0]?.todo}</p>
           </div>
         </li>
       ))}

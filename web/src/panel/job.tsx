@@ -90,6 +90,11 @@ function Progress(): JSX.Element | null {
         <span>
           <span class="dim">Line</span> {formatNumber(now.line)}
         </span>
+        {now.queued !== null && (
+          <span>
+            <span class="dim">Queued on the board</span> {formatNumber(now.queued, 1)} s
+          </span>
+        )}
       </div>
       <progress max={1} value={done} aria-label="Print progress" />
     </div>

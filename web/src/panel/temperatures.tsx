@@ -23,6 +23,12 @@ function apply(preset: Preset): void {
   if (heaters.includes('heater_bed')) setTarget('heater_bed', preset.bed);
 }
 
+/** What the heater does. Without a board that answers nothing is known but what was read last. */
+function doing({ target, duty }: HeaterState): string {
+  if (!isReady.value) return 'Last reading';
+  return target > 0 ? `Heating ${formatNumber(duty * 100)} %` : 'Off';
+}
+
 function Heater({ heater }: { readonly heater: HeaterState }): JSX.Element {
   const max = machineSummary.value?.heaters.find(({ name }) => name === heater.name)?.max ?? TARGET_MAX_C;
   const name = NAMES[heater.name];
@@ -30,11 +36,9 @@ function Heater({ heater }: { readonly heater: HeaterState }): JSX.Element {
     <li class="heater">
       <div class="heater-name">
         {name}
-        <span class="heater-duty">
-          {heater.target > 0 ? `Heating ${formatNumber(heater.duty * 100)} %` : 'Off'}
-        </span>
+        <span class="heater-duty">{doing(heater)}</span>
       </div>
-      <div class={`heater-reading ${heater.temperature >= HOT_C ? 'hot' : ''}`}>
+      <div class={`heater-reading ${heater.temperature >= HOT_C ? 'hot' : ''} ${isReady.value ? '' : 'old'}`}>
         {formatNumber(heater.temperature, 1)}
         <span class="unit"> °C</span>
       </div>
@@ -42,7 +46,7 @@ function Heater({ heater }: { readonly heater: HeaterState }): JSX.Element {
         label={`${name} target`}
         hideLabel
         unit="°C"
-        value={heater.target}
+        value={isReady.value ? heater.target : 0}
         min={0}
         max={max}
         disabled={!isReady.value}
