@@ -1,0 +1,132 @@
+// The panel as its users know it: by the names of buttons, fields and regions. Knows nothing of how it is made.
+import { join } from 'node:path';
+import { expect, type Locator, type Page } from '@playwright/test';
+import { root } from '../../scripts/lib/target.mjs';
+
+/** A sample's path. */
+export const sample = (name: string): string => join(root, 'samples', name);
+
+export type VirtualSpeed = 'Real time' | 'up to 5×' | 'up to 20×' | 'up to 200×';
+
+export class Panel {
+  readonly page: Page;
+  readonly top: Locator;
+  /** What is connected and what it does. */
+  readonly status: Locator;
+  readonly emergencyStop: Locator;
+  /** The trouble that has to be told. */
+  readonly alert: Locator;
+  readonly preview: Locator;
+  readonly job: Locator;
+  readonly print: Locator;
+  readonly temperatures: Locator;
+  readonly motion: Locator;
+  readonly tuning: Locator;
+  readonly console: Locator;
+  readonly messages: Locator;
+  readonly gcodeField: Locator;
+
+  constructor(page: Page) {
+    this.page = page;
+    this.top = page.getByRole('banner').first();
+    this.status = this.top.getByRole('status');
+    this.emergencyStop = page.getByRole('button', { name: 'Emergency stop' });
+    this.alert = page.getByRole('alert');
+    this.preview = page.getByRole('region', { name: 'Preview' });
+    this.job = page.getByRole('region', { name: 'Print', exact: true });
+    this.print = this.job.getByRole('button', { name: 'Print', exact: true });
+    this.temperatures = page.getByRole('region', { name: 'Temperatures' });
+    this.motion = page.getByRole('region', { name: 'Motion' });
+    this.tuning = page.getByRole('region', { name: 'Speed and fan' });
+    this.console = page.getByRole('region', { name: 'Console' });
+    this.messages = this.console.getByRole('list', { name: 'Messages' });
+    this.gcodeField = this.console.getByRole('textbox', { name: 'G-code to send' });
+  }
+
+  async open(): Promise<void> {
+    await this.page.goto('/');
+    await expect(this.page.getByRole('heading', { name: 'Stepcast' })).toBeVisible();
+  }
+
+  dialog(name: 'Connect' | 'Machine' | 'Settings'): Locator {
+    return this.page.getByRole('dialog', { name, exact: true });
+  }
+
+  /** Opens a dialog by its button in the bar. */
+  async openDialog(name: 'Connect' | 'Machine' | 'Settings'): Promise<Locator> {
+    await this.top.getByRole('button', { name, exact: true }).click();
+    const dialog = this.dialog(name);
+    await expect(dialog).toBeVisible();
+    return dialog;
+  }
+
+  async closeDialog(dialog: Locator): Promise<void> {
+    await dialog.getByRole('button', { name: 'Close', exact: true }).click();
+    await expect(dialog).toHaveCount(0);
+  }
+
+  /** Connects the virtual printer and waits until it is ready. */
+  async connectVirtual(speed: VirtualSpeed = 'up to 200×', faults = ''): Promise<void> {
+    const dialog = await this.openDialog('Connect');
+    const kinds = dialog.getByRole('group', { name: 'What to connect to' });
+    // Browsers without Web Serial offer no choice.
+    if (await kinds.isVisible()) await kinds.getByText('Virtual printer').click();
+    await dialog.getByRole('group', { name: 'Speed' }).getByText(speed, { exact: true }).click();
+    if (faults !== '') {
+      await dialog.getByText('Try faults out').click();
+      await dialog.getByRole('textbox', { name: 'Faults' }).fill(faults);
+    }
+    await dialog.getByRole('button', { name: 'Connect', exact: true }).click();
+    await expect(dialog).toHaveCount(0);
+    await expect(this.status).toContainText('Ready');
+  }
+
+  /** Drops a file on the page as the desktop does: dragged over it, then let go. */
+  async drop(name: string, content: Uint8Array | string): Promise<void> {
+    const base64 = Buffer.from(content).toString('base64');
+    const data = await this.page.evaluateHandle(
+      async ([name, base64]) => {
+        const transfer = new DataTransfer();
+        const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+        transfer.items.add(new File([bytes], name));
+        return transfer;
+      },
+      [name, base64] as const,
+    );
+    for (const type of ['dragenter', 'dragover', 'drop'])
+      await this.preview.dispatchEvent(type, { dataTransfer: data });
+    await data.dispose();
+  }
+
+  /** Waits until the dropped file has been read and may be printed. */
+  async expectPrintable(): Promise<void> {
+    await expect(this.print).toBeEnabled();
+  }
+
+  /** The number in a `<dt>` … `<dd>` pair of a region, as shown. */
+  fact(region: Locator, name: string): Locator {
+    return region.getByRole('term').filter({ hasText: name }).locator('xpath=following-sibling::dd');
+  }
+
+  heater(name: 'Nozzle' | 'Bed'): Locator {
+    return this.temperatures.getByRole('listitem').filter({ hasText: name });
+  }
+
+  /** Sends a line through the console. */
+  async send(gcode: string): Promise<void> {
+    await this.gcodeField.fill(gcode);
+    await this.gcodeField.press('Enter');
+  }
+
+  /** The diagnostic report, downloaded as a user does. */
+  async report(): Promise<string> {
+    const dialog = await this.openDialog('Settings');
+    const coming = this.page.waitForEvent('download');
+    await dialog.getByRole('button', { name: 'Diagnostic report' }).click();
+    const download = await coming;
+    const text: Buffer[] = [];
+    for await (const piece of await download.createReadStream()) text.push(piece as Buffer);
+    await this.closeDialog(dialog);
+    return Buffer.concat(text).toString();
+  }
+}
