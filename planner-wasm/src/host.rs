@@ -18,7 +18,9 @@ use crate::{
         BoardView, ErrorMessage, JobRequest, JobView, LinkView, Snapshot, TemperatureView, UiEvent,
         UiRequest, json,
     },
-    read_config, simulation, thrown,
+    read_config, simulation,
+    speed::SpeedRecord,
+    thrown,
 };
 
 /// The most events that wait.
@@ -28,9 +30,6 @@ const MOVES_MAX: usize = 16_384;
 /// Numbers that describe a move: line, start and end (host time, s), from x y z e, to x y z e (mm).
 pub const MOVE_NUMBERS: usize = 11;
 
-/// Moves that overlap by no more follow each other: rounding.
-const TICKS_SLACK: Ticks = Ticks(1000);
-
 /// A session with a memory.
 pub struct Host {
     session: Session,
@@ -39,6 +38,7 @@ pub struct Host {
     moves: VecDeque<ScheduledMove>,
     /// Moves that have not ended.
     ahead: VecDeque<ScheduledMove>,
+    speeds: SpeedRecord,
     board: Option<BoardView>,
     temperatures: Vec<TemperatureView>,
     line: u32,
@@ -57,6 +57,7 @@ impl Host {
             dropped: 0,
             moves: VecDeque::new(),
             ahead: VecDeque::new(),
+            speeds: SpeedRecord::default(),
             board: None,
             temperatures: Vec::new(),
             line: 0,
@@ -144,6 +145,7 @@ impl Host {
             Event::Phase(phase) if *phase != PhaseName::Ready => {
                 self.moves.clear();
                 self.ahead.clear();
+                self.speeds.clear();
                 if *phase == PhaseName::Identifying {
                     self.board = None;
                     self.temperatures.clear();
@@ -159,15 +161,13 @@ impl Host {
             }
             Event::Move(mv) => {
                 push_bounded(&mut self.moves, *mv);
-                // A homing move that the next one overlaps was cut short by its endstop.
-                while self
-                    .ahead
-                    .pop_back_if(|last| last.homing && last.end > mv.start + TICKS_SLACK)
-                    .is_some()
-                {}
                 push_bounded(&mut self.ahead, *mv);
+                self.speeds.push(mv);
             }
-            Event::Homed { .. } => self.ahead.retain(|mv| !mv.homing),
+            Event::RunBroken { at } => {
+                self.ahead.clear();
+                self.speeds.stop(*at);
+            }
             Event::Temperature { .. } => {
                 if let Some(UiEvent::Temperature { heater, temperature_c, target_c, duty }) =
                     UiEvent::of(event)
@@ -219,6 +219,13 @@ impl Host {
         let part = ticks_between(mv.start, clock_now) / ticks_between(mv.start, mv.end);
         let part = part.clamp(0.0, 1.0);
         Some([0, 1, 2, 3].map(|axis| mv.from[axis] + part * (mv.to[axis] - mv.from[axis])))
+    }
+
+    /// The toolhead's planned speed around now, pairs of time (s, relative to now) and speed (mm/s); nothing while the
+    /// board's clock is not known.
+    pub fn planned_speed(&self, now: Seconds, behind: Seconds, ahead: Seconds) -> Vec<f64> {
+        let clock = self.clock(now);
+        clock.map_or_else(Vec::new, |(now, freq)| self.speeds.around(now, freq, behind, ahead))
     }
 
     /// Everything that a panel shows.
@@ -315,6 +322,13 @@ impl PrinterSession {
         self.host.take_moves(Seconds(now_s))
     }
 
+    /// The toolhead's planned speed from `behind_s` before now to `ahead_s` after it: pairs of time (s, relative to now,
+    /// ascending) and speed (mm/s), between which it changes evenly. At most 4096 pairs, peaks kept; rest is zero, and
+    /// the curve ends early where the plan does while the head still moves. Empty while the board is not ready.
+    pub fn planned_speed(&self, now_s: f64, behind_s: f64, ahead_s: f64) -> Vec<f64> {
+        self.host.planned_speed(Seconds(now_s), Seconds(behind_s), Seconds(ahead_s))
+    }
+
     /// Asks for something: a `UiRequest` as JSON. What it leads to comes as events; an error means that nothing was done.
     pub fn request(&mut self, request: &str, now_s: f64) -> Result<(), JsError> {
         let request = serde_json::from_str(request).map_err(|error| unreadable(&error))?;
@@ -356,7 +370,7 @@ fn unreadable(error: &serde_json::Error) -> JsError {
 mod tests {
     use super::*;
     use crate::{Simulation, messages::PhaseLabel};
-    use printer::config::parse;
+    use printer::{config::parse, session::SpeedProfile};
 
     fn machine() -> PrinterConfig {
         parse(demo_machine::USUAL_MACHINE).0.unwrap()
@@ -414,6 +428,14 @@ mod tests {
         assert_eq!(snapshot.temperatures.len(), 2);
 
         let moves = host.take_moves(now);
+        let speeds = host.planned_speed(now, Seconds(6.0), Seconds(20.0));
+        let pairs: Vec<[f64; 2]> = speeds.chunks(2).map(|pair| [pair[0], pair[1]]).collect();
+        let at = |time: f64| pairs.iter().position(|pair| pair[0] > time).map(|next| pairs[next - 1][1]);
+        assert!((at(0.0).unwrap() - 8.0).abs() < 0.01, "{pairs:?}");
+        assert_eq!((pairs[0], pairs[pairs.len() - 1]), ([-6.0, 0.0], [20.0, 0.0]));
+        let driven: f64 = pairs.windows(2).map(|w| (w[1][0] - w[0][0]) * 0.5 * (w[0][1] + w[1][1])).sum();
+        assert!((driven - 100.0_f64.hypot(50.0)).abs() < 1e-3, "{driven}");
+
         assert_eq!(moves.len(), MOVE_NUMBERS);
         let (start, stop) = (moves[1], moves[2]);
         assert!(start < now.0 && now.0 < stop && stop - start > 11.0, "{moves:?}");
@@ -424,6 +446,7 @@ mod tests {
         let stopped = host.snapshot(now);
         assert_eq!((stopped.phase, stopped.live_mm), (PhaseLabel::Shutdown, None));
         assert!(stopped.error.is_some());
+        assert!(host.planned_speed(now, Seconds(6.0), Seconds(20.0)).is_empty());
     }
 
     #[test]
@@ -438,9 +461,9 @@ mod tests {
         assert_eq!(events.last(), Some(&UiEvent::Dropped { count: 10 }));
         assert_eq!(host.take_events(), []);
         for _ in 0..MOVES_MAX + 9 {
-            let still = [0.0; 4];
+            let (still, speed) = ([0.0; 4], SpeedProfile::default());
             let (start, end) = (Ticks(0), Ticks(1));
-            let mv = ScheduledMove { line: 1, start, end, from: still, to: still, homing: false };
+            let mv = ScheduledMove { line: 1, start, end, from: still, to: still, speed, homing: false };
             host.remember(&Event::Move(mv));
         }
         assert_eq!((host.moves.len(), host.ahead.len()), (MOVES_MAX, MOVES_MAX));

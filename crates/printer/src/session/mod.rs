@@ -25,7 +25,7 @@ use std::collections::VecDeque;
 use units::{Seconds, Ticks};
 use wire::Command;
 
-pub use event::{EVENTS_MAX, Event, PhaseName, Request, ScheduledMove};
+pub use event::{EVENTS_MAX, Event, PhaseName, Request, ScheduledMove, SpeedProfile};
 pub use job::{JobOptions, JobStatus};
 
 use self::{

@@ -126,6 +126,38 @@ fn dwells_waits_and_outputs_come_at_their_print_time() {
     assert!(ends.contains(&to_50.end.0) && to_0.start > to_50.end);
 }
 
+#[test]
+fn the_speed_of_each_move_adds_up_to_its_length_and_goes_on_in_the_next() {
+    let mut bench = Setup::default().ready();
+    let travel = lines(40, |n| format!("G1 X{} Y{} E0.3 F{}\n", 60 + n % 7, 60 + n % 5, 1200 + 60 * n));
+    bench.print(&(squares(2).replace(END, "") + &travel + "G4 P500\nG1 X60 Y60\nG2 X60 Y60 I10 J0 E2\n" + END));
+    bench.job_done();
+    let freq = f64::from(bench.printer.profile().clock.0);
+    let mut before: Option<ScheduledMove> = None;
+    let mut turned = 0;
+    for made in moves(&bench) {
+        let speed = made.speed;
+        let corners = [
+            (made.start.0, speed.start.0),
+            (speed.cruise_from.0, speed.cruise.0),
+            (speed.cruise_until.0, speed.cruise.0),
+            (made.end.0, speed.end.0),
+        ];
+        let driven: f64 =
+            corners.windows(2).map(|w| (w[1].0 - w[0].0) as f64 / freq * 0.5 * (w[0].1 + w[1].1)).sum();
+        let length = (0..3).map(|axis| (made.to[axis] - made.from[axis]).powi(2)).sum::<f64>().sqrt();
+        // Each corner's clock is rounded to a tick.
+        let rounding = 4.0 * speed.cruise.0 / freq;
+        assert!((driven - length).abs() <= rounding, "{made:?}: {driven} mm of {length} mm");
+        let entry = before.filter(|last| last.end == made.start).map_or(0.0, |last| last.speed.end.0);
+        assert!((speed.start.0 - entry).abs() < 1e-9, "{made:?} after {entry} mm/s");
+        turned += u32::from(entry > 0.0);
+        before = Some(made);
+    }
+    assert_eq!(before.unwrap().speed.end.0, 0.0);
+    assert!(turned > 40, "{turned} corners were passed at speed");
+}
+
 fn run_end(event: &Event) -> Option<u64> {
     if let Event::RunEnded { at } = event { Some(at.0) } else { None }
 }

@@ -8,7 +8,7 @@ use crate::{
     error::{ErrorCode, PrinterError},
     planner::{Barrier, ExtrusionPermit, Planned, TimedAction},
     session::{
-        event::{Event, ScheduledMove},
+        event::{Event, ScheduledMove, SpeedProfile},
         job::JobState,
         stream::Due,
     },
@@ -91,6 +91,7 @@ impl Ready {
                     end: at(planned.end_time()),
                     from: planned.from,
                     to: planned.to,
+                    speed: SpeedProfile::new(&planned, at),
                     homing: run.homing,
                 };
                 self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
