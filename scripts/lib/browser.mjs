@@ -1,8 +1,9 @@
 // The browser for the tests: finds a Chromium on this machine, gets one where that is allowed, and says how to start it.
 // Knows nothing of the tests. Plain Node, built-ins only.
 //
-// In this order: CHROME_PATH, an installed Chrome or Chromium, Playwright's own, and Debian's package, that one only
-// where the environment asks for it (STEPCAST_INSTALL_BROWSER=1): nobody's computer gets a package unasked.
+// In this order: CHROME_PATH, an installed Chrome or Chromium, a Chromium that Playwright installed before. Where there is
+// none: Debian's package, only where the environment asks for it (STEPCAST_INSTALL_BROWSER=1), for nobody's computer gets
+// a package unasked; else Playwright downloads its own into its folder, if the network lets it.
 import { spawnSync } from 'node:child_process';
 import { accessSync, constants, existsSync, readdirSync, readFileSync, statSync } from 'node:fs';
 import { homedir } from 'node:os';

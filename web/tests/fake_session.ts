@@ -1,4 +1,6 @@
 // A session that does what a test tells it, for the loops around it.
+
+import type { VirtualState } from '../src/bindings/VirtualState';
 import type { Snapshot, Trouble, Wish } from '../src/machine/protocol';
 import type { Session, SimulatedPrinter } from '../src/machine/session';
 import { celsius, type Seconds, seconds, share } from '../src/units';
@@ -95,6 +97,17 @@ export class EchoPrinter implements SimulatedPrinter {
     }
     this.#now = Math.max(this.#now, until);
     return new Uint8Array();
+  }
+  record(): VirtualState {
+    return {
+      time_s: this.#now,
+      connected: true,
+      motors: [],
+      heaters: [],
+      fans: [],
+      endstops: [],
+      shutdown: null,
+    };
   }
   free(): void {
     this.freed = true;

@@ -2,7 +2,7 @@
 //
 // The loops (realtime.ts, lockstep.ts) give it bytes and time; it gives them bytes and the next wake-up. Knows neither
 // clocks nor ports.
-import type { Seconds } from '../units';
+import { type Seconds, seconds } from '../units';
 import { Feeder } from './feeder';
 import type { FromMachine, MachineEvent, Trouble, Wish } from './protocol';
 import type { Session } from './session';
@@ -10,6 +10,10 @@ import { fileUnreadable } from './troubles';
 
 /** Events that wait to be told; the oldest go first beyond that, and the page is told how many. */
 const EVENTS_MAX = 2000;
+/** Of the planned speed, this much is told: what was … */
+const SPEED_BEHIND = seconds(20);
+/** … and what comes: a little more than the session plans ahead. */
+const SPEED_AHEAD = seconds(5);
 
 export class Machine {
   readonly session: Session;
@@ -19,6 +23,8 @@ export class Machine {
   #starting = false;
   #events: MachineEvent[] = [];
   #dropped = 0;
+  /** Whether the planned speed is told. */
+  watchesSpeed = false;
 
   constructor(session: Session, tell: (message: FromMachine) => void, lineErrors: () => number) {
     this.session = session;
@@ -88,6 +94,8 @@ export class Machine {
     const snapshot = this.session.snapshot(now);
     const link = snapshot.link && { ...snapshot.link, lineErrors: this.#lineErrors() };
     this.#tell({ kind: 'snapshot', snapshot: { ...snapshot, link } });
+    if (!this.watchesSpeed) return;
+    this.#tell({ kind: 'planned-speed', pairs: this.session.plannedSpeed(now, SPEED_BEHIND, SPEED_AHEAD) });
   }
 
   wish(wish: Wish, now: Seconds): Trouble | null {

@@ -4,6 +4,7 @@ import type { JobRequest } from '../bindings/JobRequest';
 import type { Snapshot as PlannerSnapshot } from '../bindings/Snapshot';
 import type { UiEvent } from '../bindings/UiEvent';
 import type { UiRequest } from '../bindings/UiRequest';
+import type { VirtualState } from '../bindings/VirtualState';
 import initialise, { PrinterSession, VirtualPrinter } from '../bindings/wasm/planner_wasm.js';
 import { inWords, plannerTrouble } from '../planner_error';
 import { celsius, mm, type Seconds, seconds, share } from '../units';
@@ -194,6 +195,10 @@ class WasmSession implements Session {
     this.#inner.job_end();
   }
 
+  plannedSpeed(now: Seconds, behind: Seconds, ahead: Seconds): Float64Array<ArrayBuffer> {
+    return this.#inner.planned_speed(now, behind, ahead) as Float64Array<ArrayBuffer>;
+  }
+
   snapshot(now: Seconds): Snapshot {
     return fromSnapshot(JSON.parse(this.#inner.snapshot(now)) as PlannerSnapshot);
   }
@@ -220,6 +225,10 @@ class WasmPrinter implements SimulatedPrinter {
 
   runUntil(until: Seconds): Uint8Array<ArrayBuffer> {
     return this.#inner.run_until_s(until) as Uint8Array<ArrayBuffer>;
+  }
+
+  record(): VirtualState {
+    return JSON.parse(this.#inner.state()) as VirtualState;
   }
 
   free(): void {

@@ -1,6 +1,7 @@
 // What the page and the machine worker say to each other, and the machine as the page sees it.
 // Shapes only. Values that come from the planner are described here in the page's own words; machine/planner.ts
 // makes them from the planner's.
+import type { VirtualState } from '../bindings/VirtualState';
 import type { PortId } from '../transport/web_serial';
 import type { Celsius, Mm, Seconds, Share } from '../units';
 
@@ -105,7 +106,9 @@ export type ToMachine =
       readonly file: Blob;
       readonly confirmedLines: readonly number[];
     }
-  | { readonly kind: 'speed'; readonly speed: number };
+  | { readonly kind: 'speed'; readonly speed: number }
+  /** Whether `planned-speed` is wanted. Holds for all connections until it is changed. */
+  | { readonly kind: 'watch-speed'; readonly on: boolean };
 
 export type FromMachine =
   /** The planner is loaded: connections can be made. */
@@ -114,6 +117,13 @@ export type FromMachine =
   /** The connection is over; `trouble` says why, where the user did not end it. */
   | { readonly kind: 'closed'; readonly trouble: Trouble | null }
   | { readonly kind: 'snapshot'; readonly snapshot: Snapshot }
+  /** The virtual printer's own record: what its motors, heaters and switches did, whatever the session believes. */
+  | { readonly kind: 'record'; readonly record: VirtualState }
+  /**
+   * The toolhead's planned speed around now, with each snapshot while it is watched: pairs of time (s, relative to now,
+   * ascending) and speed (mm/s), between which it changes evenly. Rest is zero; empty while the board is not ready.
+   */
+  | { readonly kind: 'planned-speed'; readonly pairs: Float64Array<ArrayBuffer> }
   | { readonly kind: 'events'; readonly events: readonly MachineEvent[] }
   /** What came of a wish or of a print's start. */
   | { readonly kind: 'answer'; readonly id: number; readonly trouble: Trouble | null }

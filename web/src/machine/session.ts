@@ -1,5 +1,6 @@
 // The planner's session as the worker uses it: the generated class behind the page's own types.
 // Knows no port and no clock: bytes and time are arguments.
+import type { VirtualState } from '../bindings/VirtualState';
 import type { Seconds } from '../units';
 import type { MachineEvent, Snapshot, Trouble, Wish } from './protocol';
 
@@ -18,6 +19,8 @@ export interface Session {
   jobFeed(bytes: Uint8Array): void;
   jobEnd(): void;
   snapshot(now: Seconds): Snapshot;
+  /** Pairs of time (s, relative to now) and the toolhead's planned speed (mm/s). */
+  plannedSpeed(now: Seconds, behind: Seconds, ahead: Seconds): Float64Array<ArrayBuffer>;
   free(): void;
 }
 
@@ -27,5 +30,7 @@ export interface SimulatedPrinter {
   write(bytes: Uint8Array): void;
   /** Lets time pass until `until`, or until bytes come; returns those. */
   runUntil(until: Seconds): Uint8Array<ArrayBuffer>;
+  /** The machine as an onlooker sees it. */
+  record(): VirtualState;
   free(): void;
 }

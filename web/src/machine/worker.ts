@@ -2,6 +2,7 @@
 //
 // Nothing here waits for the page. A Web Lock is held from before the port is opened to after it is closed, so that
 // one tab has a printer; a tab that holds a lock is not frozen either.
+import type { VirtualState } from '../bindings/VirtualState';
 import { ANSWER_BYTES_MAX, classify } from '../transport/answer';
 import { PortError } from '../transport/transport';
 import { find, openSerial } from '../transport/web_serial';
@@ -23,18 +24,23 @@ interface Connection {
   readonly now: () => Seconds;
   readonly tick: () => void;
   readonly setSpeed: (speed: number) => void;
+  /** The printer's own record, where it is a virtual one. */
+  readonly record: (() => VirtualState) | null;
   /** Ends the connection; the lock is let go after it. */
   readonly end: (trouble: Trouble | null) => Promise<void>;
 }
 
-const scope = self as unknown as { postMessage(message: FromMachine): void };
+const scope = self as unknown as { postMessage(message: FromMachine, transfer: Transferable[]): void };
 const realNow = (): Seconds => seconds(performance.now() / 1000);
 
 let planner: Planner | undefined;
 let connection: Connection | undefined;
 let opening: { cancelled: boolean } | undefined;
 
-const tell = (message: FromMachine): void => scope.postMessage(message);
+let watchesSpeed = false;
+
+const tell = (message: FromMachine): void =>
+  scope.postMessage(message, message.kind === 'planned-speed' ? [message.pairs.buffer] : []);
 
 /** What the port's board said before it was identified, to judge what it is. */
 class FirstBytes {
@@ -77,7 +83,7 @@ function hold(
       clearInterval(timer);
       connection = undefined;
       // While there still is a clock to ask: stopping lets go of the virtual printer.
-      parts.machine.tell(parts.now());
+      tellAll();
       await parts.stop();
       parts.machine.free();
       tell({ kind: 'closed', trouble });
@@ -85,7 +91,12 @@ function hold(
     };
     const parts = make((trouble) => void end(trouble));
     connection = { ...parts, end };
-    const timer = setInterval(() => parts.machine.tell(parts.now()), TELL_MS);
+    parts.machine.watchesSpeed = watchesSpeed;
+    const tellAll = (): void => {
+      parts.machine.tell(parts.now());
+      if (parts.record) tell({ kind: 'record', record: parts.record() });
+    };
+    const timer = setInterval(tellAll, TELL_MS);
     tell({ kind: 'opened' });
   });
 }
@@ -126,7 +137,14 @@ async function connectSerial(
       });
       void transport.lost.then((error) => over(portTrouble(error)));
       loop.start();
-      return { machine, now: realNow, tick: loop.tick, setSpeed: () => undefined, stop: () => loop.stop() };
+      return {
+        machine,
+        now: realNow,
+        tick: loop.tick,
+        setSpeed: () => undefined,
+        record: null,
+        stop: () => loop.stop(),
+      };
     });
   });
   if (!held) tell({ kind: 'closed', trouble: portInUse() });
@@ -151,6 +169,7 @@ async function connectVirtual(
         now,
         tick: loop.tick,
         setSpeed: (speed) => loop.setSpeed(speed),
+        record: () => printer.record(),
         stop: () => loop.stop(),
       };
     }),
@@ -207,6 +226,10 @@ self.onmessage = ({ data }: MessageEvent<ToMachine>): void => {
       break;
     case 'speed':
       connection?.setSpeed(data.speed);
+      break;
+    case 'watch-speed':
+      watchesSpeed = data.on;
+      if (connection) connection.machine.watchesSpeed = data.on;
       break;
   }
 };

@@ -11,11 +11,15 @@ import { Button, Choice, Dialog, NumberField } from './parts';
 import { openDialog } from './top_bar';
 
 const HAS_SERIAL = 'serial' in navigator;
+const FAULTS_EXAMPLE = 'sensor-open=extruder@90';
+const FAULTS_CHARACTERS_MAX = 500;
 const SPEEDS = [1, 5, 20, SPEED_MAX] as const;
 
 const known = signal<readonly SerialPort[]>([]);
 const chosen = signal<SerialPort | null>(null);
 const notice = signal<string | null>(null);
+/** A script of what goes wrong with the virtual printer; not kept, so that it surprises nobody another day. */
+const faults = signal('');
 
 const hex = (value: number | null): string => (value ?? 0).toString(16).padStart(4, '0');
 
@@ -53,7 +57,7 @@ function go(): void {
   const { connectTo, baud, speed } = settings.value;
   const { config } = activeProfile.value;
   if (connectTo === 'virtual' || !HAS_SERIAL) {
-    connect({ kind: 'virtual', board: 'rp2040', speed, seed: 1, faults: '' }, config);
+    connect({ kind: 'virtual', board: 'rp2040', speed, seed: 1, faults: faults.value.trim() }, config);
   } else if (chosen.value) {
     connect({ kind: 'serial', id: identify(chosen.value, known.value), baud }, config);
   }
@@ -115,6 +119,27 @@ function Virtual(): JSX.Element {
         value={(SPEEDS.find((value) => value === settings.value.speed) ?? 1) as (typeof SPEEDS)[number]}
         onSet={(speed) => change({ speed })}
       />
+      <details class="more">
+        <summary>Try faults out</summary>
+        <label class="field">
+          Faults
+          <input
+            type="text"
+            class="code"
+            placeholder={FAULTS_EXAMPLE}
+            autocomplete="off"
+            spellcheck={false}
+            maxLength={FAULTS_CHARACTERS_MAX}
+            value={faults.value}
+            onInput={(event) => (faults.value = event.currentTarget.value)}
+          />
+        </label>
+        <p class="hint">
+          What breaks, and at which second after power-up: sensor-open, sensor-short, heater-dead and
+          heater-stuck-on with extruder or heater_bed, endstop-stuck-on and endstop-stuck-off with x, y or z.
+          Several are separated by commas.
+        </p>
+      </details>
     </div>
   );
 }

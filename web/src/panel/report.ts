@@ -1,6 +1,6 @@
 // The diagnostic report: everything that somebody who helps would ask for, as text.
 import { entries } from '../state/log';
-import { connection, firmware, port, snapshot, trouble } from '../state/machine';
+import { connection, firmware, port, snapshot, trouble, virtualRecord } from '../state/machine';
 import { file, summary } from '../state/preview';
 import { activeProfile } from '../state/profiles';
 
@@ -30,6 +30,7 @@ export function diagnosticReport(): string {
       trouble: trouble.value,
     }),
     section('Machine now', snapshot.value),
+    section("Virtual printer's own record", virtualRecord.value),
     section('File', job),
     section('Messages', log.join('\n')),
     section(`printer.cfg (${activeProfile.value.name})`, activeProfile.value.config),
