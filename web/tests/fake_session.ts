@@ -68,6 +68,10 @@ export class FakeSession implements Session {
   snapshot(): Snapshot {
     return SNAPSHOT;
   }
+  /** A line through the stretch that was asked for: its speed is the time. */
+  plannedSpeed(now: Seconds, behind: Seconds, ahead: Seconds): Float64Array<ArrayBuffer> {
+    return Float64Array.of(-behind, now - behind, ahead, now + ahead);
+  }
   free(): void {
     this.polls.length = 0;
   }

@@ -36,7 +36,7 @@ const realNow = (): Seconds => seconds(performance.now() / 1000);
 let planner: Planner | undefined;
 let connection: Connection | undefined;
 let opening: { cancelled: boolean } | undefined;
-
+/** Whether the page shows the planned speed; outlives connections. */
 let watchesSpeed = false;
 
 const tell = (message: FromMachine): void =>

@@ -1,0 +1,31 @@
+// What a connection tells the page, and when.
+import { expect, test } from 'vitest';
+import { Machine } from '../src/machine/machine';
+import type { FromMachine } from '../src/machine/protocol';
+import { seconds } from '../src/units';
+import { FakeSession } from './fake_session';
+
+function machine(): { machine: Machine; session: FakeSession; told: FromMachine[] } {
+  const told: FromMachine[] = [];
+  const session = new FakeSession();
+  const tell = (message: FromMachine): void => void told.push(message);
+  return { machine: new Machine(session, tell, () => 3), session, told };
+}
+
+test('the planned speed is told with each snapshot while somebody watches it', () => {
+  const { machine: made, told } = machine();
+  made.tell(seconds(100));
+  expect(told.map(({ kind }) => kind)).toEqual(['snapshot']);
+  made.watchesSpeed = true;
+  made.tell(seconds(100));
+  made.watchesSpeed = false;
+  made.tell(seconds(101));
+  expect(told.map(({ kind }) => kind)).toEqual(['snapshot', 'snapshot', 'planned-speed', 'snapshot']);
+  const speed = told[2];
+  if (speed?.kind !== 'planned-speed') throw new Error('no planned speed');
+  const [from, , until] = speed.pairs;
+  // Around now: some of what was, and more than the session plans ahead.
+  expect(from).toBeLessThan(-5);
+  expect(until).toBeGreaterThan(4);
+  expect([...speed.pairs]).toEqual([from, 100 + (from ?? 0), until, 100 + (until ?? 0)]);
+});
