@@ -1,11 +1,11 @@
 // A session that does what a test tells it, for the loops around it.
 
 import type { VirtualState } from '../src/bindings/VirtualState';
-import type { Snapshot, Trouble, Wish } from '../src/machine/protocol';
-import type { Session, SimulatedPrinter } from '../src/machine/session';
+import type { Trouble, Wish } from '../src/machine/protocol';
+import type { Session, SessionSnapshot, SimulatedPrinter } from '../src/machine/session';
 import { celsius, type Seconds, seconds, share } from '../src/units';
 
-const SNAPSHOT: Snapshot = {
+const SNAPSHOT: SessionSnapshot = {
   phase: 'ready',
   heaters: [{ name: 'extruder', temperature: celsius(20), target: celsius(0), duty: share(0) }],
   position: null,
@@ -14,6 +14,7 @@ const SNAPSHOT: Snapshot = {
   line: 0,
   elapsed: seconds(0),
   queued: null,
+  queuedLeast: null,
   speedFactor: share(1),
   flowFactor: share(1),
   fan: share(0),
@@ -65,7 +66,7 @@ export class FakeSession implements Session {
   jobEnd(): void {
     this.ended = true;
   }
-  snapshot(): Snapshot {
+  snapshot(): SessionSnapshot {
     return SNAPSHOT;
   }
   /** A line through the stretch that was asked for: its speed is the time. */

@@ -29,3 +29,16 @@ test('the planned speed is told with each snapshot while somebody watches it', (
   expect(until).toBeGreaterThan(4);
   expect([...speed.pairs]).toEqual([from, 100 + (from ?? 0), until, 100 + (until ?? 0)]);
 });
+
+test('wake-ups that come late are counted, and told from a second on', () => {
+  const { machine: made, told } = machine();
+  for (const late of [0.004, 2.5, -0.001, 1.5]) made.woke(seconds(late));
+  made.tell(seconds(100));
+  expect(told.slice(0, 2)).toEqual([
+    { kind: 'gap', seconds: 2.5 },
+    { kind: 'gap', seconds: 1.5 },
+  ]);
+  const now = told[2];
+  if (now?.kind !== 'snapshot') throw new Error('no snapshot');
+  expect(now.snapshot.wakeUps).toEqual({ missed: 2, latest: 2.5 });
+});

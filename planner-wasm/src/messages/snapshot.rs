@@ -104,6 +104,9 @@ pub struct JobView {
     pub elapsed_s: f64,
     /// How much of its file has been taken; a double counts bytes exactly up to 2⁵³.
     pub fed_bytes: f64,
+    /// The least motion that the board had since the print's start, while more of it was to come. `null` before there was
+    /// any.
+    pub queued_least_s: Option<f64>,
 }
 
 /// Counts of a link since the connection began.

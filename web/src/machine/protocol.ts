@@ -46,6 +46,13 @@ export interface LinkCounts {
   readonly lineErrors: number;
 }
 
+/** How late the worker's timers were since the connection began. */
+export interface WakeUps {
+  /** So many by more than a second: the computer slept, or was very busy. */
+  readonly missed: number;
+  readonly latest: Seconds;
+}
+
 /** The machine now. Sent several times a second. */
 export interface Snapshot {
   readonly phase: Phase;
@@ -60,10 +67,13 @@ export interface Snapshot {
   readonly elapsed: Seconds;
   /** Motion that the board has and has not made yet; null while none is being made. */
   readonly queued: Seconds | null;
+  /** The least of it since the print's start, while more was to come. */
+  readonly queuedLeast: Seconds | null;
   readonly speedFactor: Share;
   readonly flowFactor: Share;
   readonly fan: Share;
   readonly link: LinkCounts | null;
+  readonly wakeUps: WakeUps;
 }
 
 /** What the page is told in words, in the order in which it happened. */
@@ -81,7 +91,8 @@ export type Wish =
   | { readonly kind: 'gcode'; readonly text: string }
   | { readonly kind: 'home'; readonly axes: readonly Axis[] }
   | { readonly kind: 'jog'; readonly axis: Axis; readonly distance: Mm }
-  | { readonly kind: 'extrude'; readonly length: Mm }
+  /** `speed` in mm/s of filament. */
+  | { readonly kind: 'extrude'; readonly length: Mm; readonly speed: number }
   | { readonly kind: 'temperature'; readonly heater: HeaterName; readonly target: Celsius }
   | { readonly kind: 'fan' | 'speed-factor' | 'flow-factor'; readonly value: Share }
   | { readonly kind: 'motors-off' | 'pause' | 'resume' | 'cancel' | 'emergency-stop' | 'firmware-restart' };

@@ -4,6 +4,9 @@ import type { VirtualState } from '../bindings/VirtualState';
 import type { Seconds } from '../units';
 import type { MachineEvent, Snapshot, Trouble, Wish } from './protocol';
 
+/** What a session knows of a snapshot; the rest is its owner's. */
+export type SessionSnapshot = Omit<Snapshot, 'wakeUps'>;
+
 export interface Session {
   receive(bytes: Uint8Array, now: Seconds): void;
   /** Bytes for the port; may be empty. */
@@ -18,7 +21,7 @@ export interface Session {
   jobWants(): number;
   jobFeed(bytes: Uint8Array): void;
   jobEnd(): void;
-  snapshot(now: Seconds): Snapshot;
+  snapshot(now: Seconds): SessionSnapshot;
   /** Pairs of time (s, relative to now) and the toolhead's planned speed (mm/s). */
   plannedSpeed(now: Seconds, behind: Seconds, ahead: Seconds): Float64Array<ArrayBuffer>;
   free(): void;

@@ -132,7 +132,6 @@ async function connectSerial(
       const loop = new RealTimeLoop(transport, {
         machine,
         now: realNow,
-        onGap: (gap) => tell({ kind: 'gap', seconds: gap }),
         onBytes: (bytes) => first.take(bytes),
       });
       void transport.lost.then((error) => over(portTrouble(error)));
