@@ -244,3 +244,17 @@ fn every_step_of_a_run_comes_before_its_end() {
     assert_eq!(steps, [0; MOTORS]);
     assert_eq!(planner.generator().stats()[0].steps, 2 * 800);
 }
+
+#[test]
+fn a_plan_retracts_as_the_machine_file_says() {
+    let filament_mm = |length: f64| {
+        let mut config = machine_file();
+        config.firmware_retraction.as_mut().expect("the sample has it").retract_length = units::Mm(length);
+        let mut plan = PlanStream::new(&config).unwrap();
+        let mut blocks = Vec::new();
+        plan.feed(b"G28\nG10\nG1 X10 F3000\n", &mut blocks, |_| {}).unwrap();
+        plan.finish(&mut blocks, |_| {}).unwrap().filament_mm
+    };
+    assert!((filament_mm(0.8) + 0.8).abs() < 0.01);
+    assert!((filament_mm(2.0) + 2.0).abs() < 0.01);
+}
