@@ -353,22 +353,8 @@ impl Planner {
         }));
     }
 
-    /// A file may ask for less speed and acceleration than the machine file allows, never for more.
     fn limit(&mut self, limit: VelocityLimit) {
-        let machine = &self.machine_limits;
-        let mut limits = self.limits;
-        if let Some(velocity) = limit.velocity {
-            limits.max_velocity = velocity.min(machine.max_velocity);
-        }
-        if let Some(accel) = limit.accel {
-            limits.max_accel = accel.min(machine.max_accel);
-        }
-        if let Some(corner) = limit.square_corner_velocity {
-            limits.square_corner_velocity = corner.min(machine.square_corner_velocity);
-        }
-        if let Some(ratio) = limit.minimum_cruise_ratio {
-            limits.minimum_cruise_ratio = ratio;
-        }
+        let limits = machine::lowered(&self.machine_limits, &self.limits, &limit);
         // Limits that make no sense (zero, not a number) leave those that hold.
         if self.look_ahead.set_limits(limits).is_ok() {
             self.limits = limits;

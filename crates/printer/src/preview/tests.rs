@@ -102,22 +102,31 @@ fn a_slicer_without_comments_has_layers_too() {
 #[test]
 fn the_time_is_the_plans() {
     let config = machine();
-    let (_, _, preview) = read(TEST_PART.as_bytes(), Some(&config), 100_000);
-    let report = preview.finish();
-    let mut plan = PlanStream::new(&config).unwrap();
-    let mut blocks = Vec::new();
-    for piece in TEST_PART.as_bytes().chunks(32 * 1024) {
-        plan.feed(piece, &mut blocks, |_| {}).unwrap();
-        blocks.clear();
+    // The machine's endstops are at 0, where a plan's axes are after homing.
+    for file in [TEST_PART, SMALL_PART] {
+        let (_, _, preview) = read(file.as_bytes(), Some(&config), 100_000);
+        let report = preview.finish();
+        let mut plan = PlanStream::new(&config).unwrap();
+        let mut blocks = Vec::new();
+        for piece in file.as_bytes().chunks(32 * 1024) {
+            plan.feed(piece, &mut blocks, |_| {}).unwrap();
+            blocks.clear();
+        }
+        let expected = plan.finish(&mut blocks, |_| {}).unwrap();
+        let found = report.print_time.unwrap().0;
+        let apart = (found - expected.print_time.0).abs();
+        assert!(apart < 1e-6, "{found} {}", expected.print_time);
+        assert!((report.check.filament_mm - expected.filament_mm).abs() < 1e-6);
+        let features: f64 = report.features.iter().map(|feature| feature.time.0).sum();
+        let layers: f64 = report.layers.iter().map(|layer| layer.time.0).sum();
+        assert!((features + report.travel_time.0 - found).abs() < 1e-6);
+        assert!((layers - found).abs() < 1e-6, "{layers} {found}");
     }
-    let expected = plan.finish(&mut blocks, |_| {}).unwrap().print_time.0;
-    let found = report.print_time.unwrap().0;
-    // The plan's axes are at 0 after homing, those here where their endstops are: the first move differs.
-    assert!((found - expected).abs() < 1e-3 * expected, "{found} {expected}");
-    let features: f64 = report.features.iter().map(|feature| feature.time.0).sum();
-    let layers: f64 = report.layers.iter().map(|layer| layer.time.0).sum();
-    assert!((features + report.travel_time.0 - found).abs() < 1e-6);
-    assert!((layers - found).abs() < 1e-6, "{layers} {found}");
+}
+
+#[test]
+fn a_slicers_name_and_estimate_are_told() {
+    let report = read(TEST_PART.as_bytes(), None, 100_000).2.finish();
     assert!(report.slicer_time.is_some() && report.generator.is_some());
 }
 

@@ -130,7 +130,9 @@ fn dwells_waits_and_outputs_come_at_their_print_time() {
 fn the_speed_of_each_move_adds_up_to_its_length_and_goes_on_in_the_next() {
     let mut bench = Setup::default().ready();
     let travel = lines(40, |n| format!("G1 X{} Y{} E0.3 F{}\n", 60 + n % 7, 60 + n % 5, 1200 + 60 * n));
-    bench.print(&(squares(2).replace(END, "") + &travel + "G4 P500\nG1 X60 Y60\nG2 X60 Y60 I10 J0 E2\n" + END));
+    bench.print(
+        &(squares(2).replace(END, "") + &travel + "G4 P500\nG1 X60 Y60\nG2 X60 Y60 I10 J0 E2\n" + END),
+    );
     bench.job_done();
     let freq = f64::from(bench.printer.profile().clock.0);
     let mut before: Option<ScheduledMove> = None;
