@@ -10,6 +10,7 @@ import { guardPrint } from './panel/guard';
 import { followProfile } from './panel/machine_summary';
 import { startMachine } from './state/machine';
 import { startPreview } from './state/preview';
+import { followPrint } from './state/print';
 import { loadProfiles } from './state/profiles';
 import { applySettings } from './state/settings';
 
@@ -19,4 +20,5 @@ if (root) render(<App />, root);
 startMachine();
 startPreview();
 guardPrint();
+followPrint();
 void loadProfiles().then(followProfile);

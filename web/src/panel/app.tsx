@@ -9,6 +9,7 @@ import { Job } from './job';
 import { MachineDialog } from './machine_dialog';
 import { Motion } from './motion';
 import { dropped } from './open_file';
+import { Asked } from './question';
 import { SettingsDialog } from './settings_dialog';
 import { Temperatures } from './temperatures';
 import { openDialog, TopBar } from './top_bar';
@@ -74,6 +75,7 @@ export function App(): JSX.Element {
       {openDialog.value === 'connect' && <ConnectDialog />}
       {openDialog.value === 'machine' && <MachineDialog />}
       {openDialog.value === 'settings' && <SettingsDialog />}
+      <Asked />
     </>
   );
 }

@@ -170,6 +170,7 @@ export function ConnectDialog(): JSX.Element {
         {HAS_SERIAL ? (
           <Choice
             label="What to connect to"
+            hideLabel
             choices={[
               { value: 'serial', text: 'Printer on USB' },
               { value: 'virtual', text: 'Virtual printer' },

@@ -4,8 +4,9 @@ import { effect, signal } from '@preact/signals';
 import { attachControls, ToolpathHost } from '@stepcast/toolpath';
 import type { JSX } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
-import { isPrinting, snapshot } from '../state/machine';
-import { file, printedVertex, reading, setSink, summary } from '../state/preview';
+import { isPrinting } from '../state/machine';
+import { file, reading, setSink, summary } from '../state/preview';
+import { isShown, printedVertex } from '../state/print';
 import { change, settings } from '../state/settings';
 import { Icon } from './icons';
 import { Legend } from './legend';
@@ -37,14 +38,11 @@ const PRINTED_MS = 1000;
 
 /** Tells the printed part from the rest while printing; returns what ends that. */
 function followPrint(host: ToolpathHost): () => void {
-  const tell = (): void => {
-    const now = snapshot.peek();
-    host.setPrintedUpTo(isPrinting.peek() && now ? printedVertex(now) : null);
-  };
+  const tell = (): void => host.setPrintedUpTo(printedVertex());
   let timer: ReturnType<typeof setInterval> | undefined;
   const end = effect(() => {
     clearInterval(timer);
-    timer = isPrinting.value ? setInterval(tell, PRINTED_MS) : undefined;
+    timer = isPrinting.value && isShown.value ? setInterval(tell, PRINTED_MS) : undefined;
     tell();
   });
   return () => {
