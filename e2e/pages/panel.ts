@@ -1,10 +1,14 @@
 // The panel as its users know it: by the names of buttons, fields and regions. Knows nothing of how it is made.
-import { join } from 'node:path';
+import { basename, join } from 'node:path';
 import { expect, type Locator, type Page } from '@playwright/test';
 import { root } from '../../scripts/lib/target.mjs';
+import { recordOf, type VirtualState } from './record.ts';
 
 /** A sample's path. */
 export const sample = (name: string): string => join(root, 'samples', name);
+
+/** The drag operation of files, in the browser's mask. */
+const COPY = 1;
 
 export type VirtualSpeed = 'Real time' | 'up to 5×' | 'up to 20×' | 'up to 200×';
 
@@ -81,21 +85,23 @@ export class Panel {
     await expect(this.status).toContainText('Ready');
   }
 
-  /** Drops a file on the page as the desktop does: dragged over it, then let go. */
-  async drop(name: string, content: Uint8Array | string): Promise<void> {
-    const base64 = Buffer.from(content).toString('base64');
-    const data = await this.page.evaluateHandle(
-      async ([name, base64]) => {
-        const transfer = new DataTransfer();
-        const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-        transfer.items.add(new File([bytes], name));
-        return transfer;
-      },
-      [name, base64] as const,
-    );
-    for (const type of ['dragenter', 'dragover', 'drop'])
-      await this.preview.dispatchEvent(type, { dataTransfer: data });
-    await data.dispose();
+  /** Disconnects a printer that is not printing. */
+  async disconnect(): Promise<void> {
+    await this.top.getByRole('button', { name: 'Disconnect' }).click();
+    await expect(this.status).toContainText('Not connected');
+  }
+
+  /** Drops a file of this computer on the preview, as the desktop does: dragged in, moved, let go. */
+  async drop(path: string): Promise<void> {
+    const box = await this.preview.boundingBox();
+    if (!box) throw new Error('the preview is not on the page');
+    const at = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+    const data = { items: [], files: [path], dragOperationsMask: COPY };
+    const session = await this.page.context().newCDPSession(this.page);
+    for (const type of ['dragEnter', 'dragOver', 'drop'] as const)
+      await session.send('Input.dispatchDragEvent', { type, ...at, data });
+    await session.detach();
+    await expect(this.job.getByRole('heading', { name: basename(path) })).toBeVisible();
   }
 
   /** Waits until the dropped file has been read and may be printed. */
@@ -106,6 +112,11 @@ export class Panel {
   /** The number in a `<dt>` … `<dd>` pair of a region, as shown. */
   fact(region: Locator, name: string): Locator {
     return region.getByRole('term').filter({ hasText: name }).locator('xpath=following-sibling::dd');
+  }
+
+  /** Where the page says that the head is, in mm. */
+  async position(axis: 'X' | 'Y' | 'Z'): Promise<number> {
+    return Number(await this.fact(this.motion, axis).innerText());
   }
 
   heater(name: 'Nozzle' | 'Bed'): Locator {
@@ -128,5 +139,18 @@ export class Panel {
     for await (const piece of await download.createReadStream()) text.push(piece as Buffer);
     await this.closeDialog(dialog);
     return Buffer.concat(text).toString();
+  }
+
+  /** What the virtual printer itself says of its motors, heaters and switches. */
+  async record(): Promise<VirtualState> {
+    return recordOf(await this.report());
+  }
+
+  /** Homes all axes and waits until the position is known. */
+  async home(): Promise<void> {
+    await this.motion.getByRole('button', { name: 'Home all axes' }).click();
+    for (const axis of ['X', 'Y', 'Z'])
+      await expect(this.fact(this.motion, axis)).not.toContainText('not homed');
+    await expect(this.messages).toContainText('Z is homed');
   }
 }
