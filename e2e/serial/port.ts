@@ -31,9 +31,9 @@ export interface PortOptions {
 /** How often a free device catches up with the real clock, ms. */
 const TICK_MS = 2;
 /** Bytes of a device that shares its clock are gathered for so long, s of its time. */
-const GATHER_S = 1e-3;
+const GATHER_S = 4e-3;
 /** So far a device may go before the realm is asked again, s of its time: it may have been given something to do. */
-const GRANT_MAX_S = 20e-3;
+const GRANT_MAX_S = 50e-3;
 /** A free device that is faster than real time and further behind, s of real time, goes on from where it is. */
 const BEHIND_MAX_S = 0.1;
 /** Turns of a device in one advance. */
