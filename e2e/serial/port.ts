@@ -79,7 +79,8 @@ export class BridgePort {
   /** The device's time when its clock was shared; undefined while it is free. */
   #sharedSince: number | undefined;
   #timer: ReturnType<typeof setTimeout> | undefined;
-  #grantedUntil: number | undefined;
+  /** So far the realm lets time pass, ms on the shared clock. */
+  #grantedMs: number | undefined;
 
   constructor(id: number, device: Device, options: PortOptions) {
     this.id = id;
@@ -312,7 +313,7 @@ export class BridgePort {
   #free(): void {
     if (!this.isShared) return;
     this.#sharedSince = undefined;
-    this.#grantedUntil = undefined;
+    this.#grantedMs = undefined;
     this.#reanchor();
     this.#holder?.tell({ kind: 'clock-free' });
   }
@@ -320,19 +321,23 @@ export class BridgePort {
   /** The realm has nothing to do before this time on the shared clock, ms. */
   idle(untilMs: number): void {
     if (this.#sharedSince === undefined) return;
-    this.#grantedUntil = this.#sharedSince + untilMs / 1000;
+    this.#grantedMs = untilMs;
     this.#round();
   }
 
   /** The device goes on as far as the realm and the speed allow, then it is the realm's turn. */
   #round(): void {
-    if (this.#grantedUntil === undefined) return;
+    const granted = this.#grantedMs;
+    if (granted === undefined || this.#sharedSince === undefined) return;
     const now = this.device.now();
-    const until = Math.max(now, Math.min(this.#grantedUntil, now + GRANT_MAX_S));
+    const wanted = this.#sharedSince + granted / 1000;
+    const until = Math.max(now, Math.min(wanted, now + GRANT_MAX_S));
     // The next tick comes back to it.
     if (until > this.#limit()) return;
-    this.#grantedUntil = undefined;
+    this.#grantedMs = undefined;
     this.#advance(until);
-    this.#holder?.tell({ kind: 'turn', passed: this.#sharedMs() });
+    // What the realm waits for has come where it has: seconds and milliseconds round in their own ways.
+    const isThere = this.device.now() >= wanted;
+    this.#holder?.tell({ kind: 'turn', passed: Math.max(this.#sharedMs(), isThere ? granted : 0) });
   }
 }
