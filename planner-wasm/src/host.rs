@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use printer::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
-    session::{Event, JobOptions, JobStatus, PhaseName, Request, ScheduledMove, Session},
+    session::{Event, JobOptions, JobStatus, PhaseName, ScheduledMove, Session},
 };
 use units::{Seconds, Ticks};
 use wasm_bindgen::prelude::{JsError, wasm_bindgen};
@@ -45,8 +45,6 @@ pub struct Host {
     elapsed_s: f64,
     fed_bytes: u64,
     queued_least: Option<Seconds>,
-    speed_factor: f64,
-    flow_factor: f64,
 }
 
 impl Host {
@@ -65,8 +63,6 @@ impl Host {
             elapsed_s: 0.0,
             fed_bytes: 0,
             queued_least: None,
-            speed_factor: 1.0,
-            flow_factor: 1.0,
         }
     }
 
@@ -95,17 +91,7 @@ impl Host {
 
     /// Asks for something.
     pub fn request(&mut self, request: UiRequest, now: Seconds) -> Result<(), PrinterError> {
-        let request = Request::from(request);
-        let (speed, flow) = match request {
-            Request::SetSpeedFactor(factor) => (Some(factor), None),
-            Request::SetFlowFactor(factor) => (None, Some(factor)),
-            _ => (None, None),
-        };
-        let result = self.session.request(request, now);
-        if result.is_ok() {
-            self.speed_factor = speed.unwrap_or(self.speed_factor);
-            self.flow_factor = flow.unwrap_or(self.flow_factor);
-        }
+        let result = self.session.request(request.into(), now);
         self.sort_events();
         result
     }
@@ -117,9 +103,6 @@ impl Host {
         self.elapsed_s = 0.0;
         self.fed_bytes = 0;
         self.queued_least = None;
-        // A job's modal state is its own.
-        self.speed_factor = 1.0;
-        self.flow_factor = 1.0;
         self.sort_events();
         Ok(())
     }
@@ -244,6 +227,7 @@ impl Host {
     /// Everything that a panel shows.
     pub fn snapshot(&mut self, now: Seconds) -> Snapshot {
         let position = self.session.position();
+        let [speed_factor, flow_factor] = self.session.factors();
         Snapshot {
             phase: self.session.phase().into(),
             error: self.session.error().map(ErrorMessage::from),
@@ -260,8 +244,8 @@ impl Host {
                 queued_least_s: self.queued_least.map(|time| time.0),
             },
             queued_s: self.session.motion_queued(now).map(|time| time.0),
-            speed_factor: self.speed_factor,
-            flow_factor: self.flow_factor,
+            speed_factor,
+            flow_factor,
             fan: self.session.fan_speed(),
             link: self.session.link_stats().map(LinkView::from),
         }

@@ -286,10 +286,10 @@ impl PrinterError {
         Self { code, detail: detail.into(), line: None, ended: Ended::Nothing }
     }
 
-    /// The same, with the line of the G-code that led to it.
+    /// The same, with the line of the G-code that led to it; 0 where none did.
     #[must_use]
     pub fn at_line(mut self, line: u32) -> Self {
-        self.line = Some(line);
+        self.line = Some(line).filter(|&line| line > 0);
         self
     }
 

@@ -27,9 +27,9 @@ pub struct Snapshot {
     pub job: JobView,
     /// Motion that the board has and has not made; `null` outside of a run.
     pub queued_s: Option<f64>,
-    /// As last set here; 1 is as written.
+    /// Of what is planned from now on, whoever set it: the page, or an `M220`. 1 is as written.
     pub speed_factor: f64,
-    /// As last set here; 1 is as written.
+    /// The same of the extrusion (`M221`).
     pub flow_factor: f64,
     /// The part fan, 0 … 1.
     pub fan: f64,

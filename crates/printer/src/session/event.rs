@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use gcode::{Annotation, Diagnostic, Heater, ObjectAction};
 use motion::PlannedMove;
-use units::{Celsius, MmPerS, Seconds, Ticks};
+use units::{Celsius, Mm, MmPerS, Seconds, Ticks};
 
 use crate::{error::PrinterError, planner::Position};
 
@@ -227,8 +227,18 @@ pub enum PhaseName {
 /// What an owner may ask.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
-    /// Lines of G-code, typed by a user.
+    /// Lines of G-code, typed by a user. Each text's lines are counted from 1.
     Gcode(String),
+    /// A move by hand, from where the last one will have ended. Modes, factors and the feed of what is typed stay as they
+    /// are, and have no part in it.
+    MoveBy {
+        /// 0, 1, 2 for X, Y, Z; 3 for the filament.
+        axis: usize,
+        /// How far; negative is towards lower positions.
+        distance: Mm,
+        /// How fast.
+        speed: MmPerS,
+    },
     /// A heater's target; 0 is off.
     SetTemperature(Heater, Celsius),
     /// The part fan's speed, 0 ..= 1.

@@ -235,6 +235,22 @@ fn faster_and_thicker_takes_effect_in_the_middle() {
     assert!(counts[3] > plain.1[3] * 11 / 10 && counts[3] < plain.1[3] * 3 / 2);
     // Nonsense changes nothing.
     bench.ask(Request::SetSpeedFactor(f64::NAN));
+    assert_eq!(bench.session.factors(), [2.0, 1.5]);
+}
+
+#[test]
+fn factors_are_those_of_the_lines_that_were_read() {
+    let mut bench = Setup::default().ready();
+    bench.gcode("M220 S50");
+    assert_eq!(bench.session.factors(), [0.5, 1.0]);
+    // A job begins with its own.
+    bench.start(&format!("{START}M220 S80\nM221 S95\nG1 X10 F6000\nG1 X100 E1 F600\n{END}"));
+    assert_eq!(bench.session.factors(), [1.0, 1.0]);
+    bench.line(10);
+    assert_eq!(bench.session.factors(), [0.8, 0.95]);
+    bench.job_over();
+    bench.job_done();
+    assert_eq!(bench.session.factors(), [0.5, 1.0]);
 }
 
 #[test]

@@ -140,7 +140,7 @@ impl Ready {
             }
             Ok(Wish::Cancelled) => {
                 self.wait = Wait::Nothing;
-                self.planner.correct(&mut self.console);
+                self.planner.correct(&mut self.console.source);
             }
             Err(error) => self.homing_failed(error, now),
         }
