@@ -5,6 +5,7 @@ import { useEffect } from 'preact/hooks';
 import { isPrinting } from '../state/machine';
 import { ConnectDialog } from './connect_dialog';
 import { Console } from './console';
+import { Instruments } from './instruments';
 import { Job } from './job';
 import { MachineDialog } from './machine_dialog';
 import { Motion } from './motion';
@@ -64,6 +65,7 @@ export function App(): JSX.Element {
           <Temperatures />
           <Motion />
           <Tuning />
+          <Instruments />
           <Console />
         </div>
       </main>

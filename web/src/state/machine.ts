@@ -24,6 +24,8 @@ export const port = signal<PortChoice | null>(null);
 export const snapshot = signal<Snapshot | null>(null);
 /** The virtual printer's own record; of the last connection once that is closed. */
 export const virtualRecord = signal<VirtualState | null>(null);
+/** The planned speed around now while it is watched: pairs of s from now and mm/s. */
+export const plannedSpeed = signal(new Float64Array());
 export const firmware = signal<{ readonly version: string; readonly mcu: string } | null>(null);
 /** What the user has to be told, until it is put away or overtaken. */
 export const trouble = signal<Trouble | null>(null);
@@ -56,6 +58,7 @@ function closed(reason: Trouble | null): void {
   connection.value = 'closed';
   port.value = null;
   snapshot.value = null;
+  plannedSpeed.value = new Float64Array();
   firmware.value = null;
   for (const settle of waiting.values()) settle(null);
   waiting.clear();
@@ -85,6 +88,9 @@ function take(message: FromMachine): void {
       break;
     case 'snapshot':
       if (connection.value === 'open') snapshot.value = message.snapshot;
+      break;
+    case 'planned-speed':
+      if (connection.value === 'open') plannedSpeed.value = message.pairs;
       break;
     case 'record':
       virtualRecord.value = message.record;
@@ -167,6 +173,9 @@ export function connect(choice: PortChoice, config: string): void {
   trouble.value = null;
   send({ kind: 'connect', port: choice, config });
 }
+
+/** Whether `plannedSpeed` is wanted. */
+export const watchSpeed = (on: boolean): void => send({ kind: 'watch-speed', on });
 
 export const disconnect = (): void => send({ kind: 'disconnect' });
 

@@ -26,6 +26,7 @@ export interface Settings {
   /** mm of filament a second. */
   readonly extrudeSpeed: number;
   readonly showTravel: boolean;
+  readonly showInstruments: boolean;
 }
 
 const KEY = 'stepcast-settings';
@@ -51,6 +52,7 @@ export const DEFAULTS: Settings = {
   extrudeLength: 5,
   extrudeSpeed: 3,
   showTravel: false,
+  showInstruments: false,
 };
 
 const between = (value: unknown, min: number, max: number, otherwise: number): number =>
@@ -94,6 +96,7 @@ export function readSettings(text: string | null): Settings {
     extrudeLength: between(stored.extrudeLength, 0.1, EXTRUDE_MAX_MM, DEFAULTS.extrudeLength),
     extrudeSpeed: between(stored.extrudeSpeed, 0.1, EXTRUDE_SPEED_MAX_MM_S, DEFAULTS.extrudeSpeed),
     showTravel: stored.showTravel === true,
+    showInstruments: stored.showInstruments === true,
   };
 }
 
