@@ -34,11 +34,11 @@ export class Panel {
     this.page = page;
     this.top = page.getByRole('banner').first();
     this.status = this.top.getByRole('status');
-    this.emergencyStop = page.getByRole('button', { name: 'Emergency stop' });
+    this.emergencyStop = this.top.getByRole('button', { name: 'Emergency stop' });
     this.alert = page.getByRole('alert');
     this.preview = page.getByRole('region', { name: 'Preview' });
     this.job = page.getByRole('region', { name: 'Print', exact: true });
-    this.print = this.job.getByRole('button', { name: 'Print', exact: true });
+    this.print = this.job.getByRole('button', { name: /^Print( again)?$/ });
     this.temperatures = page.getByRole('region', { name: 'Temperatures' });
     this.motion = page.getByRole('region', { name: 'Motion' });
     this.tuning = page.getByRole('region', { name: 'Speed and fan' });
@@ -69,17 +69,21 @@ export class Panel {
     await expect(dialog).toHaveCount(0);
   }
 
-  /** Connects the virtual printer and waits until it is ready. */
-  async connectVirtual(speed: VirtualSpeed = 'up to 200×', faults = ''): Promise<void> {
-    const dialog = await this.openDialog('Connect');
+  /** Chooses the virtual printer in the dialog. */
+  async chooseVirtual(dialog: Locator, speed: VirtualSpeed, faults = ''): Promise<void> {
     const kinds = dialog.getByRole('group', { name: 'What to connect to' });
     // Browsers without Web Serial offer no choice.
     if (await kinds.isVisible()) await kinds.getByText('Virtual printer').click();
     await dialog.getByRole('group', { name: 'Speed' }).getByText(speed, { exact: true }).click();
-    if (faults !== '') {
-      await dialog.getByText('Try faults out').click();
-      await dialog.getByRole('textbox', { name: 'Faults' }).fill(faults);
-    }
+    if (faults === '') return;
+    await dialog.getByText('Try faults out').click();
+    await dialog.getByRole('textbox', { name: 'Faults' }).fill(faults);
+  }
+
+  /** Connects the virtual printer and waits until it is ready. */
+  async connectVirtual(speed: VirtualSpeed = 'up to 200×', faults = ''): Promise<void> {
+    const dialog = await this.openDialog('Connect');
+    await this.chooseVirtual(dialog, speed, faults);
     await dialog.getByRole('button', { name: 'Connect', exact: true }).click();
     await expect(dialog).toHaveCount(0);
     await expect(this.status).toContainText('Ready');
@@ -104,11 +108,6 @@ export class Panel {
     await expect(this.job.getByRole('heading', { name: basename(path) })).toBeVisible();
   }
 
-  /** Waits until the dropped file has been read and may be printed. */
-  async expectPrintable(): Promise<void> {
-    await expect(this.print).toBeEnabled();
-  }
-
   /** The number in a `<dt>` … `<dd>` pair of a region, as shown. */
   fact(region: Locator, name: string): Locator {
     return region.getByRole('term').filter({ hasText: name }).locator('xpath=following-sibling::dd');
@@ -121,6 +120,25 @@ export class Panel {
 
   heater(name: 'Nozzle' | 'Bed'): Locator {
     return this.temperatures.getByRole('listitem').filter({ hasText: name });
+  }
+
+  target(name: 'Nozzle' | 'Bed'): Locator {
+    return this.temperatures.getByRole('textbox', { name: `${name} target` });
+  }
+
+  /** Answers a question that the page asks before something that cannot be taken back. */
+  async answer(question: string, button: string): Promise<void> {
+    await this.page
+      .getByRole('dialog', { name: question })
+      .getByRole('button', { name: button, exact: true })
+      .click();
+  }
+
+  /** Starts the file that is open, once it may be printed. */
+  async startPrint(): Promise<void> {
+    await expect(this.print).toBeEnabled();
+    await this.print.click();
+    await expect(this.status).toContainText('Printing');
   }
 
   /** Sends a line through the console. */

@@ -1,27 +1,11 @@
 // Files that cannot be printed as they are: what is wrong is said by line, and nothing goes to the printer.
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
-import { join } from 'node:path';
-import { test as base, expect } from '../fixtures/test.ts';
+import { readFileSync } from 'node:fs';
+import { expect, test } from '../fixtures/files.ts';
 import { type Panel, sample } from '../pages/panel.ts';
 import { pulsesOf } from '../pages/record.ts';
 
 const PREAMBLE = 'G28\nG90\nM82\nG92 E0\nM104 S200\nM109 S200\n';
 const SQUARE = 'G1 X50 Y50 Z5 F3000\nG1 X60\nG1 Y60\nG1 X50\nG1 Y50\nM104 S0\n';
-
-/** Writes files that a test makes, and takes them away after it. */
-const test = base.extend<{ makeFile: (name: string, content: string | Uint8Array) => string }>({
-  // biome-ignore lint/correctness/noEmptyPattern: Playwright reads the names of what a fixture needs from here
-  makeFile: async ({}, use) => {
-    const folder = mkdtempSync(join(tmpdir(), 'stepcast-e2e-'));
-    await use((name, content) => {
-      const path = join(folder, name);
-      writeFileSync(path, content);
-      return path;
-    });
-    rmSync(folder, { recursive: true });
-  },
-});
 
 const errors = (panel: Panel) => panel.job.getByRole('list', { name: 'What stops the print' });
 
@@ -100,6 +84,6 @@ test('another file takes the place of a broken one', async ({ panel, makeFile })
   await panel.drop(makeFile('empty.gcode', ''));
   await expect(errors(panel)).toBeVisible();
   await panel.drop(sample('test-part-small.gcode'));
-  await panel.expectPrintable();
+  await expect(panel.print).toBeEnabled();
   await expect(errors(panel)).toHaveCount(0);
 });

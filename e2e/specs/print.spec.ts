@@ -32,9 +32,7 @@ test('a dropped file is printed to its end, step for step', async ({ panel }) =>
 
   await panel.connectVirtual();
   await panel.drop(sample(FILE));
-  await panel.expectPrintable();
-  await panel.print.click();
-  await expect(panel.status).toContainText('Printing');
+  await panel.startPrint();
   await expect(panel.job.getByRole('progressbar', { name: 'Print progress' })).toBeVisible();
   await expect(panel.job).toContainText('The print is done.', { timeout: 120_000 });
   await expect(panel.status).toContainText('Ready');
