@@ -1,11 +1,12 @@
 // Choosing what to connect to: a printer on USB, or the virtual printer in this page.
 import { signal } from '@preact/signals';
 import type { JSX } from 'preact';
-import { useEffect } from 'preact/hooks';
+import { useEffect, useId } from 'preact/hooks';
 import { connect, plannerFailed, plannerLoaded, refusePort } from '../state/machine';
 import { activeProfile, profiles, SHIPPED } from '../state/profiles';
 import { change, SPEED_MAX, settings } from '../state/settings';
 import { identify, type PortId } from '../transport/web_serial';
+import { faultProblem } from './faults';
 import { machineSummary } from './machine_summary';
 import { Button, Choice, Dialog, NumberField } from './parts';
 import { openDialog } from './top_bar';
@@ -13,6 +14,8 @@ import { openDialog } from './top_bar';
 const HAS_SERIAL = 'serial' in navigator;
 const FAULTS_EXAMPLE = 'sensor-open=extruder@90';
 const FAULTS_CHARACTERS_MAX = 500;
+const FAULTS_HINT =
+  'What breaks, and at which second after power-up: sensor-open, sensor-short, heater-dead, heater-stuck-on (=extruder or heater_bed), endstop-stuck-on, endstop-stuck-off (=x, y or z), unplug, replug. Damage to the bytes all the time: corrupt, drop, duplicate, delay (=probability). Several are separated by commas.';
 const SPEEDS = [1, 5, 20, SPEED_MAX] as const;
 
 const known = signal<readonly SerialPort[]>([]);
@@ -107,6 +110,8 @@ function Ports(): JSX.Element {
 }
 
 function Virtual(): JSX.Element {
+  const hintId = useId();
+  const problem = faultProblem(faults.value);
   return (
     <div class="stack">
       <p>
@@ -121,25 +126,31 @@ function Virtual(): JSX.Element {
       />
       <details class="more">
         <summary>Try faults out</summary>
-        <label class="field">
-          Faults
-          <input
-            type="text"
-            class="code"
-            placeholder={FAULTS_EXAMPLE}
-            autocomplete="off"
-            spellcheck={false}
-            maxLength={FAULTS_CHARACTERS_MAX}
-            value={faults.value}
-            onInput={(event) => (faults.value = event.currentTarget.value)}
-          />
-        </label>
-        <p class="hint">
-          What breaks, and at which second after power-up: sensor-open, sensor-short, heater-dead and
-          heater-stuck-on with extruder or heater_bed, endstop-stuck-on and endstop-stuck-off with x, y or z.
-          Several are separated by commas.
-        </p>
+        <div class="stack">
+          <label class="field">
+            Faults
+            <input
+              type="text"
+              class="code"
+              placeholder={FAULTS_EXAMPLE}
+              autocomplete="off"
+              autocapitalize="off"
+              spellcheck={false}
+              maxLength={FAULTS_CHARACTERS_MAX}
+              value={faults.value}
+              aria-invalid={problem !== null}
+              aria-describedby={hintId}
+              onInput={(event) => (faults.value = event.currentTarget.value)}
+            />
+          </label>
+          <p class={problem === null ? 'hint' : 'field-hint'} id={hintId} role="status">
+            {problem ?? FAULTS_HINT}
+          </p>
+        </div>
       </details>
+      {faults.value.trim() !== '' && problem === null && (
+        <p class="hint">These faults will happen: {faults.value}</p>
+      )}
     </div>
   );
 }
@@ -148,7 +159,8 @@ function obstacle(isSerial: boolean): string | null {
   if (plannerFailed.value) return 'The planner could not be loaded.';
   if (!plannerLoaded.value) return 'The planner is still loading.';
   if (!machineSummary.value) return 'The machine file has errors: mend it under Machine.';
-  return isSerial && !chosen.value ? 'Choose a port first.' : null;
+  if (!isSerial) return faultProblem(faults.value) === null ? null : 'The faults cannot be read: see above.';
+  return chosen.value ? null : 'Choose a port first.';
 }
 
 export function ConnectDialog(): JSX.Element {
