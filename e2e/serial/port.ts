@@ -61,7 +61,7 @@ export class BridgePort {
   corruptShare = 0;
   /** After so many bytes to the host one is lost to a framing error; 0 is never. */
   framingErrorEvery = 0;
-  readonly counts = { toDevice: 0, toHost: 0, openings: 0 };
+  readonly counts = { toDevice: 0, toHost: 0, openings: 0, damaged: 0 };
   readonly baudRates: number[] = [];
   signals: OutputSignals = {};
   /** Called with all bytes as they reach the device. */
@@ -249,6 +249,7 @@ export class BridgePort {
       const good = every - this.#sinceError;
       if (good > 0) this.#push(rest.subarray(0, good));
       this.#push('FramingError');
+      this.counts.damaged += 1;
       rest = rest.subarray(good + 1);
       this.#sinceError = 0;
     }
@@ -262,6 +263,7 @@ export class BridgePort {
       // A linear congruence: the same bits flip in every run.
       this.#chance = (this.#chance * 1_103_515_245 + 12_345) % 2 ** 31;
       const isHit = this.#chance / 2 ** 31 < this.corruptShare;
+      if (isHit) this.counts.damaged += 1;
       return isHit ? byte ^ (1 << (this.#chance & 7)) : byte;
     });
   }

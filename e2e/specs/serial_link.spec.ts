@@ -18,9 +18,7 @@ const duties = (printer: PrinterDevice): number[] => printer.state().heaters.map
 async function startPrint(panel: SerialPanel, printer: PrinterDevice, seconds = 600): Promise<void> {
   await expect(panel.status).toContainText('Ready');
   await panel.dropText(strolling(seconds));
-  await panel.expectPrintable();
-  await panel.print.click();
-  await expect(panel.status).toContainText('Printing');
+  await panel.startPrint();
   // Beyond homing: all axes are at rest there in between, and 100 mm are 8000 steps.
   await expect.poll(() => printer.state().motors[1]?.position_mm ?? 0).toBeGreaterThan(60);
   expect(Math.max(...duties(printer))).toBeGreaterThan(0);
@@ -119,8 +117,8 @@ test('a board that dies in the middle of a block', async ({ bridge, open }) => {
   await expect(panel.status).toContainText('Ready');
   // A block is five bytes at least.
   printer.dieAfter(1003);
-  await expect(panel.alert).toContainText('The board stopped answering');
-  await expect(panel.alert).toContainText(/cut its power.*connect again, and home/);
+  await expect(panel.alert).toContainText('The connection to the printer broke.');
+  await expect(panel.alert).toContainText(/Check cable and power, connect again, and home/);
   await expect(panel.status).toContainText('Failed');
 });
 
