@@ -21,6 +21,7 @@ const NEAR_END_PX = 24;
 function Log(): JSX.Element {
   const ref = useRef<HTMLOListElement>(null);
   const follows = useRef(true);
+  const lastTop = useRef(0);
   const last = entries.value.at(-1)?.id;
   // Follows what is new, unless the user has scrolled up to read.
   useEffect(() => {
@@ -35,7 +36,10 @@ function Log(): JSX.Element {
       tabIndex={0}
       aria-label="Messages"
       onScroll={({ currentTarget: { scrollHeight, scrollTop, clientHeight } }) => {
-        follows.current = scrollHeight - scrollTop - clientHeight < NEAR_END_PX;
+        // What comes meanwhile also makes the end farther away: only going up says that somebody reads.
+        if (scrollTop < lastTop.current) follows.current = false;
+        if (scrollHeight - scrollTop - clientHeight < NEAR_END_PX) follows.current = true;
+        lastTop.current = scrollTop;
       }}
     >
       {entries.value.length === 0 && <li class="dim">What happens is noted here.</li>}

@@ -135,7 +135,7 @@ function waiting(): string | null {
   const heater = heatingUp.value;
   if (heater) {
     const [now, target] = [heater.temperature, heater.target].map((value) => formatNumber(value));
-    return `Heating the ${HEATERS[heater.name]}: ${now} of ${target} °C.`;
+    return `Heating the ${HEATERS[heater.name]}: ${now} of ${target}\u00a0°C.`;
   }
   return job.value === 'printing' && snapshot.value?.queued === null && snapshot.value.elapsed === 0
     ? 'Getting ready.'

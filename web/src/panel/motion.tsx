@@ -108,7 +108,7 @@ function coldReason(): string | null {
   const min = machineSummary.value?.heaters.find(({ name }) => name === 'extruder')?.extrudeMin ?? null;
   const now = snapshot.value?.heaters.find(({ name }) => name === 'extruder')?.temperature;
   if (min === null || now === undefined || now >= min) return null;
-  return `The nozzle is too cold to push filament: ${formatNumber(now)} °C, at least ${formatNumber(min)} °C are needed.`;
+  return `The nozzle is too cold to push filament: ${formatNumber(now)}\u00a0°C, at least ${formatNumber(min)}\u00a0°C are needed.`;
 }
 
 function Filament(): JSX.Element {
