@@ -8,6 +8,7 @@ import { isPrinting, isReady, snapshot } from '../state/machine';
 import { file, reading, setSink, summary } from '../state/preview';
 import { isShown, printedVertex } from '../state/print';
 import { change, settings } from '../state/settings';
+import { isDark } from '../state/theme';
 import { Icon } from './icons';
 import { Legend } from './legend';
 import { machineSummary } from './machine_summary';
@@ -27,12 +28,6 @@ const DIRECTIONS = [
   { name: 'Top', label: 'View from the top', direction: { azimuth: 0, elevation: 1.55 } },
   { name: 'Front', label: 'View from the front', direction: { azimuth: 0, elevation: 0.05 } },
 ] as const;
-
-const dark = window.matchMedia('(prefers-color-scheme: dark)');
-const systemIsDark = signal(dark.matches);
-dark.addEventListener('change', (event) => {
-  systemIsDark.value = event.matches;
-});
 
 function sizeOf(canvas: HTMLElement): { width: number; height: number; ratio: number } {
   const { clientWidth, clientHeight } = canvas;
@@ -98,11 +93,7 @@ function follow(host: ToolpathHost): () => void {
     },
   });
   const ends = [
-    effect(() => {
-      const { theme } = settings.value;
-      const isDark = theme === 'system' ? systemIsDark.value : theme === 'dark';
-      host.setTheme(isDark ? 'dark' : 'light');
-    }),
+    effect(() => host.setTheme(isDark.value ? 'dark' : 'light')),
     effect(() => {
       const axes = machineSummary.value?.axes;
       const [x, y] = axes ?? [];
