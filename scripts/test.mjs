@@ -36,7 +36,7 @@ function browserAbsent() {
 }
 
 const steps = [
-  { name: 'scripts', commands: [nodeTests('steps.test.mjs', 'toolchain.test.mjs', 'server.test.mjs', 'browser.test.mjs')] },
+  { name: 'scripts', commands: [nodeTests('steps.test.mjs', 'toolchain.test.mjs', 'server.test.mjs', 'start.test.mjs', 'browser.test.mjs')] },
   { name: 'format', commands: [['cargo', 'fmt', '--all', '--check']] },
   { name: 'layers', commands: [['cargo', 'xtask', 'layers']] },
   {
