@@ -11,6 +11,8 @@ pub const AHEAD_S: f64 = 6.0;
 pub const PAIRS_MAX: usize = 4096;
 /// The least that the scale reaches to, mm/s.
 const SCALE_MIN_MM_S: f64 = 20.0;
+/// The scale shrinks when so many plans in a row had no use for it: ten seconds of them.
+const SHRINK_AFTER: u32 = 100;
 /// Marks of the scale.
 const SCALE_STEPS: f64 = 4.0;
 
@@ -19,6 +21,9 @@ const SCALE_STEPS: f64 = 4.0;
 pub struct PlannedSpeed {
     corners: Vec<Point>,
     scale_mm_s: f64,
+    /// Plans in a row for which a smaller scale would do, and the largest that one of them needed.
+    too_big: u32,
+    needed_since_mm_s: f64,
 }
 
 impl PlannedSpeed {
@@ -34,9 +39,15 @@ impl PlannedSpeed {
             }
         }
         let (_, needed_mm_s) = axis::scale(self.peak_mm_s().max(SCALE_MIN_MM_S), SCALE_STEPS);
-        // It grows at once, and shrinks only when it has become much too big: a scale that jumps is hard to read.
-        if needed_mm_s > self.scale_mm_s || needed_mm_s < self.scale_mm_s / 2.0 {
-            self.scale_mm_s = needed_mm_s;
+        // It grows at once and shrinks late: a scale that jumps is hard to read.
+        if needed_mm_s >= self.scale_mm_s {
+            (self.scale_mm_s, self.too_big, self.needed_since_mm_s) = (needed_mm_s, 0, 0.0);
+            return;
+        }
+        self.too_big += 1;
+        self.needed_since_mm_s = self.needed_since_mm_s.max(needed_mm_s);
+        if self.too_big >= SHRINK_AFTER {
+            (self.scale_mm_s, self.too_big, self.needed_since_mm_s) = (self.needed_since_mm_s, 0, 0.0);
         }
     }
 
@@ -121,10 +132,12 @@ mod tests {
     fn the_scale_grows_at_once_and_shrinks_late() {
         let mut speed = planned(&[0.0, 180.0]);
         assert_eq!(speed.scale_mm_s(), 200.0);
-        speed.set(&[0.0, 110.0]);
-        assert_eq!(speed.scale_mm_s(), 200.0);
-        speed.set(&[0.0, 30.0]);
-        assert_eq!(speed.scale_mm_s(), 30.0);
+        for _ in 1..SHRINK_AFTER {
+            speed.set(&[0.0, 30.0]);
+            assert_eq!(speed.scale_mm_s(), 200.0);
+        }
+        speed.set(&[0.0, 60.0]);
+        assert_eq!(speed.scale_mm_s(), 60.0, "what the largest of them needed");
         speed.set(&[0.0, 210.0]);
         assert_eq!(speed.scale_mm_s(), 300.0);
         assert_eq!(PlannedSpeed::default().scale_mm_s(), SCALE_MIN_MM_S);

@@ -16,15 +16,21 @@ use crate::window::{SPAN_DEFAULT_S, Window};
 /// A temperature scale reaches to this at least, °C.
 const SCALE_MIN_C: f64 = 50.0;
 /// Marks of a temperature scale.
-const SCALE_STEPS: f64 = 4.0;
+const SCALE_STEPS: f64 = 5.0;
 /// Points between two marks of a time axis, at least.
 const TIME_MARK_POINTS: f64 = 64.0;
 /// Room for the numbers left of a graph, so that both begin at the same place; points.
 const SCALE_WIDTH: f32 = 30.0;
+/// Room right of a graph, for half of the last mark's words; points.
+const MARGIN_RIGHT: f32 = 14.0;
+/// A mark nearer to the start than this share of the axis has no words: the scale's zero stands there.
+const START_SHARE: f64 = 0.08;
 /// How much of the height the temperatures get.
 const TEMPERATURE_SHARE: f32 = 0.56;
 /// Height of a graph's heading with the space below it, points.
 const HEADING_HEIGHT: f32 = 20.0;
+/// Between the two graphs, points.
+const GAP: f32 = 8.0;
 
 /// What is shown, and how.
 pub struct View {
@@ -69,7 +75,8 @@ impl View {
         ui.spacing_mut().item_spacing.y = 0.0;
         let upper = (height * TEMPERATURE_SHARE).floor();
         self.temperatures(ui, &colours, upper - HEADING_HEIGHT);
-        self.planned_speed(ui, &colours, height - upper - HEADING_HEIGHT);
+        ui.add_space(GAP);
+        self.planned_speed(ui, &colours, height - upper - GAP - HEADING_HEIGHT);
     }
 
     /// First and last moment of which a temperature is known, s.
@@ -92,15 +99,13 @@ impl View {
             self.heaters.iter().filter_map(|heater| heater.peak_c(absolute_s)).fold(SCALE_MIN_C, f64::max);
         let (step_c, top_c) = axis::scale(peak_c, SCALE_STEPS);
         let lines = self.temperature_lines(colours, absolute_s, column_s);
-        let readout = self.readout(now_s);
+        let readout = temperature_readout(&self.heaters, self.decimal_sign, now_s);
         let plot = graph("temperature", ui, height, (start_s, end_s), step_c).label_formatter(readout);
         let response = plot.show(ui, |plot| {
             plot.set_plot_bounds(PlotBounds::from_min_max([start_s, 0.0], [end_s, top_c]));
             for (line, stroke, style) in lines {
                 let points: Vec<Point> = line.iter().map(|point| [point[0] - now_s, point[1]]).collect();
-                plot.line(
-                    Line::new("", PlotPoints::from(points)).stroke(stroke).style(style).allow_hover(false),
-                );
+                plot.line(quiet_line(points, stroke).style(style));
             }
         });
         if self.kept_s().is_none() {
@@ -151,26 +156,6 @@ impl View {
         lines
     }
 
-    /// What is said of the moment under the pointer.
-    fn readout(&self, now_s: f64) -> impl Fn(&HoverPosition<'_>) -> Option<String> + use<> {
-        let heaters = self.heaters.clone();
-        let sign = self.decimal_sign;
-        move |hover| {
-            let t_s = position(hover)[0];
-            let mut lines = vec![axis::time_label(t_s.min(0.0), 1.0)];
-            for heater in &heaters {
-                let Some(reading) = heater.at(now_s + t_s) else { continue };
-                let measured = axis::number(reading.measured_c, 1, sign);
-                let target = match reading.target_c > 0.0 {
-                    true => format!(" of {} °C", axis::number(reading.target_c, 0, sign)),
-                    false => " °C".to_owned(),
-                };
-                lines.push(format!("{} {measured}{target}", heater.label));
-            }
-            (lines.len() > 1).then(|| lines.join("\n"))
-        }
-    }
-
     fn planned_speed(&self, ui: &mut Ui, colours: &Palette, height: f32) {
         heading(ui, colours, "Planned speed, mm/s", |_| ());
         let top_mm_s = self.speed.scale_mm_s();
@@ -178,19 +163,16 @@ impl View {
         let range_s = (-BEHIND_S, AHEAD_S);
         let column_s = (AHEAD_S + BEHIND_S) / f64::from(ui.available_width().max(1.0));
         let (made, ahead) = self.speed.lines(column_s);
-        let sign = self.decimal_sign;
-        let speed = self.speed.clone();
-        let readout = move |hover: &HoverPosition<'_>| {
+        let readout = |hover: &HoverPosition<'_>| {
             let t_s = position(hover)[0];
-            let speed_mm_s = speed.at(t_s)?;
-            Some(format!("{} s\n{} mm/s", axis::number(t_s, 1, sign), axis::number(speed_mm_s, 0, sign)))
+            let speed_mm_s = axis::number(self.speed.at(t_s)?, 0, self.decimal_sign);
+            Some(format!("{} s\n{speed_mm_s} mm/s", axis::number(t_s, 1, self.decimal_sign)))
         };
         let plot = graph("speed", ui, height, range_s, step_mm_s).label_formatter(readout);
         let response = plot.show(ui, |plot| {
             plot.set_plot_bounds(PlotBounds::from_min_max([range_s.0, 0.0], [range_s.1, top_mm_s * 1.06]));
             for (line, colour) in [(made, colours.now), (ahead, colours.speed)] {
-                let line = Line::new("", PlotPoints::from(line)).stroke(Stroke::new(1.6, colour));
-                plot.line(line.fill(0.0).fill_alpha(0.14).allow_hover(false));
+                plot.line(quiet_line(line, Stroke::new(1.6, colour)).fill(0.0).fill_alpha(0.14));
             }
             plot.vline(VLine::new("", 0.0).stroke(Stroke::new(1.0, colours.text)).allow_hover(false));
         });
@@ -200,9 +182,37 @@ impl View {
     }
 }
 
+/// A line that the pointer does not catch. The points are thinned already: a band in their place would hide the dips.
+fn quiet_line(points: Vec<Point>, stroke: Stroke) -> Line<'static> {
+    Line::new("", PlotPoints::from(points)).stroke(stroke).allow_band(false).allow_hover(false)
+}
+
 fn position(hover: &HoverPosition<'_>) -> Point {
     let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) = hover;
     [position.x, position.y]
+}
+
+/// What is said of the moment under the pointer, where something was read then.
+fn temperature_readout(
+    heaters: &[Heater],
+    decimal_sign: char,
+    now_s: f64,
+) -> impl Fn(&HoverPosition<'_>) -> Option<String> + use<'_> {
+    move |hover| {
+        let t_s = position(hover)[0];
+        let mut lines = vec![axis::time_label(t_s.min(0.0), 1.0)];
+        for heater in heaters {
+            let Some(reading) = heater.at(now_s + t_s) else { continue };
+            let measured = axis::number(reading.measured_c, 1, decimal_sign);
+            let target = if reading.target_c > 0.0 {
+                format!(" of {} °C", axis::number(reading.target_c, 0, decimal_sign))
+            } else {
+                " °C".to_owned()
+            };
+            lines.push(format!("{} {measured}{target}", heater.label));
+        }
+        (lines.len() > 1).then(|| lines.join("\n"))
+    }
 }
 
 fn heater_colour(colours: &Palette, index: usize) -> Color32 {
@@ -243,7 +253,10 @@ fn graph<'a>(name: &str, ui: &Ui, height: f32, range_s: (f64, f64), step: f64) -
         }
     };
     let times = AxisHints::new_x()
-        .formatter(move |mark, _| axis::time_label(mark.value, time_step_s))
+        .formatter(move |mark, range| {
+            let from_start = (mark.value - range.start()) / (range.end() - range.start());
+            if from_start < START_SHARE { String::new() } else { axis::time_label(mark.value, time_step_s) }
+        })
         .label_spacing(4.0..=8.0)
         .tick_label_color(colours.dim);
     let values = AxisHints::new_y()
@@ -252,6 +265,7 @@ fn graph<'a>(name: &str, ui: &Ui, height: f32, range_s: (f64, f64), step: f64) -
         .min_thickness(SCALE_WIDTH)
         .tick_label_color(colours.dim);
     Plot::new(Arc::<str>::from(name))
+        .width((ui.available_width() - MARGIN_RIGHT).max(1.0))
         .height(height.max(1.0))
         .sense(Sense::click_and_drag())
         .allow_drag(false)
@@ -270,3 +284,6 @@ fn graph<'a>(name: &str, ui: &Ui, height: f32, range_s: (f64, f64), step: f64) -
         .custom_x_axes(vec![times])
         .custom_y_axes(vec![values])
 }
+
+#[cfg(test)]
+mod tests;
