@@ -149,6 +149,9 @@ catalogue! {
     WrongFirmware, "wrong-firmware":
         "The board answers, but not as Klipper-compatible firmware does", NOTHING_MOVED,
         "Flash Klipper-compatible firmware, or connect with a program that speaks this board's language.";
+    BoardUnreadable, "board-unreadable":
+        "The board answers, but nothing that can be read", NOTHING_MOVED,
+        "The baud rate is probably wrong: take the one that the firmware was built with (250000 and 115200 are common). Otherwise use a shorter cable without a hub.";
     DictionaryInvalid, "dictionary-invalid":
         "The board's description of itself cannot be read", NOTHING_MOVED,
         "Connect again; if it stays so, flash the firmware again.";

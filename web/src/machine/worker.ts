@@ -17,7 +17,7 @@ import { answerTrouble, plannerMissing, portInUse, portTrouble, workerDied } fro
 /** How often the page is told how things are, in ms. */
 const TELL_MS = 100;
 /** Errors for which the first bytes may know a better reason. */
-const UNIDENTIFIED = new Set(['board-silent', 'wrong-firmware']);
+const UNIDENTIFIED = new Set(['board-silent', 'board-unreadable', 'wrong-firmware']);
 
 interface Connection {
   readonly machine: Machine;

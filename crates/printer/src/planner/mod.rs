@@ -27,7 +27,8 @@ pub use source::{SOURCE_BYTES_MAX, Source};
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
-    machine::{self, EXTRUDER, MOTORS},
+    machine::{self, EXTRUDER},
+    step_rate::StepRates,
 };
 
 /// How far the run of motion is.
@@ -86,8 +87,7 @@ pub struct Planner {
     ready: VecDeque<Planned>,
     barrier: Option<(LineNumber, Barrier)>,
     said: Said,
-    /// What each motor's driver can follow, as the speed of its axis.
-    motor_speed_max: [MmPerS; MOTORS],
+    step_rates: StepRates,
     is_broken: bool,
 }
 
@@ -113,7 +113,7 @@ impl Planner {
             ready: VecDeque::new(),
             barrier: None,
             said: Said::default(),
-            motor_speed_max: machine::motor_speeds_max(config, clock),
+            step_rates: StepRates::new(config, clock),
             is_broken: false,
         })
     }
@@ -353,6 +353,7 @@ impl Planner {
         }));
     }
 
+    /// A file may ask for less speed and acceleration than the machine file allows, never for more.
     fn limit(&mut self, limit: VelocityLimit) {
         let limits = machine::lowered(&self.machine_limits, &self.limits, &limit);
         // Limits that make no sense (zero, not a number) leave those that hold.
@@ -385,34 +386,11 @@ impl Planner {
         self.push(to, mv.feed, mv.line)
     }
 
-    /// Refuses what no driver can step, by the highest speed that the limits leave. An extruder that moves along with
-    /// the axes is judged when its steps are made: its junctions slow it down.
-    fn judge_speed(&self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
-        let delta: [f64; MOTORS] = core::array::from_fn(|motor| to[motor] - self.position[motor]);
-        let travel = delta[..3].iter().map(|d| d * d).sum::<f64>().sqrt();
-        let limits = &self.limits;
-        let (length, speed, motors) = if travel > 0.0 {
-            (travel, feed.min(limits.max_velocity), 0..EXTRUDER)
-        } else {
-            let speed = feed.min(limits.extruder.max_extrude_only_velocity);
-            (delta[EXTRUDER].abs(), speed, EXTRUDER..MOTORS)
-        };
-        for motor in motors {
-            let share = delta[motor].abs() / length;
-            let z_bound = if motor == 2 { limits.max_z_velocity } else { speed };
-            if share > 0.0 && z_bound.min(speed * share) > self.motor_speed_max[motor] {
-                let detail = format!("{} at {:.0} mm/s", machine::MOTOR_NAMES[motor], speed.0 * share);
-                return Err(PrinterError::new(ErrorCode::StepRateTooHigh, detail).at_line(line.0));
-            }
-        }
-        Ok(())
-    }
-
     fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
         if to == self.position {
             return Ok(());
         }
-        self.judge_speed(to, feed, line)?;
+        self.step_rates.judge_request(self.position, to, feed, &self.limits, line)?;
         if self.run == Run::None {
             self.look_ahead.begin_run();
             self.generator.begin_run(self.position).map_err(|error| wrong(&error).at_line(line.0))?;
@@ -431,6 +409,10 @@ impl Planner {
     }
 
     fn take_planned(&mut self, planned: PlannedMove) -> Result<(), PrinterError> {
+        if let Err(error) = self.step_rates.judge_planned(&planned) {
+            self.is_broken = true;
+            return Err(error);
+        }
         if let Err(error) = self.generator.push(&planned) {
             self.is_broken = true;
             let code = match error {

@@ -5,7 +5,7 @@ use steps::StepCommandKind;
 use units::Celsius;
 
 use super::*;
-use crate::config;
+use crate::{config, machine::MOTORS};
 
 const CLOCK: Hertz = Hertz(12_000_000);
 

@@ -2,6 +2,7 @@ use super::vertex::{Flags, Vertex};
 use super::*;
 use crate::{
     config::{SMALL_MACHINE, parse},
+    error::ErrorCode,
     planner::PlanStream,
 };
 
@@ -298,4 +299,30 @@ fn it_takes_no_more_than_it_wants() {
     while preview.run(&mut words) {}
     assert_eq!(preview.wants(), INPUT_BYTES_MAX);
     assert_eq!(preview.read_bytes(), INPUT_BYTES_MAX as u64);
+}
+
+#[test]
+fn an_extruder_that_would_step_too_fast_along_with_the_axes_is_found_at_its_line() {
+    // 4515 steps/mm of filament: with pulses of 2 µs 55 mm/s are the most.
+    let (usual, fine) = ("rotation_distance: 22.6789511", "rotation_distance: 0.70871722");
+    let config = parse(&MACHINE.replacen(usual, fine, 1)).0.unwrap();
+    let errors = |config: &PrinterConfig, gcode: &str| {
+        let text = format!("G28\nM104 S200\nM83\nG1 X50 F6000\n{gcode}\nG1 X0\nM104 S0\n");
+        let errors = read(text.as_bytes(), Some(config), usize::MAX).2.finish().check.errors;
+        errors.iter().map(|error| (error.code, error.line)).collect::<Vec<_>>()
+    };
+    let too_fast = |line| vec![(ErrorCode::StepRateTooHigh, Some(line))];
+    assert_eq!(errors(&config, "G1 X150 E75 F6000"), too_fast(5));
+    assert_eq!(
+        errors(&config, "G1 X150 E75 F6000\nG1 X999"),
+        [(ErrorCode::StepRateTooHigh, Some(5)), (ErrorCode::MoveOutOfRange, Some(6))]
+    );
+    assert_eq!(
+        errors(&config, "SET_VELOCITY_LIMIT ACCEL=500\nG1 X51 E0.75 F6000\nG1 X150 E75 F6000"),
+        too_fast(7)
+    );
+    // It is the speed that is reached that counts, and the motor.
+    assert_eq!(errors(&config, "G1 X50.5 E0.37 F6000"), []);
+    assert_eq!(errors(&config, "G1 X150 E50 F6000"), []);
+    assert_eq!(errors(&machine(), "G1 X150 E75 F6000"), []);
 }
