@@ -49,14 +49,6 @@ export class PrinterDevice implements Device {
     return JSON.parse(this.#printer.state()) as VirtualState;
   }
 
-  /** Whether all motors have stood still for the last seconds. */
-  hasRestedFor(seconds: number): boolean {
-    const recent = this.samples.filter(({ timeS }) => timeS >= this.now() - seconds - SAMPLE_S);
-    const last = recent.at(-1)?.pulses;
-    const isLong = (recent.at(-1)?.timeS ?? 0) - (recent[0]?.timeS ?? 0) >= seconds;
-    return isLong && recent.every(({ pulses }) => pulses.every((count, motor) => count === last?.[motor]));
-  }
-
   opened(baudRate: number): void {
     const own = this.#options.baudRate;
     this.#isGarbled = own !== undefined && own !== baudRate;

@@ -26,7 +26,7 @@ export class Writing {
   #stream: WritableStream<BufferSource> | null = null;
   #controller: WritableStreamDefaultController | undefined;
   #buffered = 0;
-  #room: { resolve: () => void; reject: (error: unknown) => void } | undefined;
+  #wait: { resolve: () => void; reject: (error: unknown) => void } | undefined;
   #ended = false;
 
   constructor(bufferSize: number, sink: Sink) {
@@ -48,8 +48,8 @@ export class Writing {
       {
         start: (controller) => {
           this.#controller = controller;
-          // An abort does not wait for room that may never come.
-          controller.signal.addEventListener('abort', () => this.#room?.reject(controller.signal.reason));
+          // An abort does not wait for what may never come: room, or the device taking the last byte.
+          controller.signal.addEventListener('abort', () => this.#wait?.reject(controller.signal.reason));
         },
         write: (chunk) => this.#write(chunk),
         close: () => this.#closed(),
@@ -78,15 +78,25 @@ export class Writing {
 
   #waitForRoom(): Promise<void> {
     return new Promise<void>((resolve, reject) => {
-      this.#room = { resolve, reject };
+      this.#wait = { resolve, reject };
     }).finally(() => {
-      this.#room = undefined;
+      this.#wait = undefined;
     });
   }
 
   async #closed(): Promise<void> {
-    await this.#sink.drain();
-    this.#forget();
+    const cut = new Promise<void>((_, reject) => {
+      this.#wait = { resolve: () => undefined, reject };
+    });
+    try {
+      await Promise.race([this.#sink.drain(), cut]);
+      this.#forget();
+    } catch (error) {
+      this.#aborted();
+      throw error;
+    } finally {
+      this.#wait = undefined;
+    }
   }
 
   #aborted(): void {
@@ -102,14 +112,14 @@ export class Writing {
   /** So many bytes have left the buffer, or were dropped from it. */
   taken(bytes: number): void {
     this.#buffered = Math.max(0, this.#buffered - bytes);
-    this.#room?.resolve();
+    this.#wait?.resolve();
   }
 
   /** A system error: this stream ends, another follows. */
   error(error: DOMException): void {
     const controller = this.#controller;
     this.#forget();
-    this.#room?.reject(error);
+    this.#wait?.reject(error);
     controller?.error(error);
   }
 
