@@ -147,7 +147,8 @@ fn the_speed_of_each_move_adds_up_to_its_length_and_goes_on_in_the_next() {
         ];
         let driven: f64 =
             corners.windows(2).map(|w| (w[1].0 - w[0].0) as f64 / freq * 0.5 * (w[0].1 + w[1].1)).sum();
-        let length = (0..3).map(|axis| (made.to[axis] - made.from[axis]).powi(2)).sum::<f64>().sqrt();
+        let way: [f64; 3] = core::array::from_fn(|axis| made.to[axis] - made.from[axis]);
+        let length = way.iter().map(|d| d * d).sum::<f64>().sqrt();
         // Each corner's clock is rounded to a tick.
         let rounding = 4.0 * speed.cruise.0 / freq;
         assert!((driven - length).abs() <= rounding, "{made:?}: {driven} mm of {length} mm");
