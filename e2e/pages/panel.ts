@@ -49,7 +49,7 @@ export class Panel {
 
   async open(): Promise<void> {
     await this.page.goto('/');
-    await expect(this.page.getByRole('heading', { name: 'Stepcast' })).toBeVisible();
+    await expect(this.top).toBeVisible();
   }
 
   dialog(name: 'Connect' | 'Machine' | 'Settings'): Locator {
@@ -95,17 +95,40 @@ export class Panel {
     await expect(this.status).toContainText('Not connected');
   }
 
-  /** Drops a file of this computer on the preview, as the desktop does: dragged in, moved, let go. */
+  /** Drops a file and waits until it is the one that may be printed. */
   async drop(path: string): Promise<void> {
+    await this.look(path);
+    await expect(this.job.getByRole('heading', { name: basename(path) })).toBeVisible();
+  }
+
+  /** Turns the view by mouse as long as the condition holds; returns how many times. */
+  async turnWhile(condition: () => boolean): Promise<number> {
+    const { x, y } = await this.middleOfPreview();
+    const { mouse } = this.page;
+    await mouse.move(x, y);
+    await mouse.down();
+    let turns = 0;
+    for (; condition(); turns += 1) {
+      await mouse.move(x + 80 * Math.sin(turns / 3), y + 30 * Math.cos(turns / 3));
+    }
+    await mouse.up();
+    return turns;
+  }
+
+  private async middleOfPreview(): Promise<{ x: number; y: number }> {
     const box = await this.preview.boundingBox();
     if (!box) throw new Error('the preview is not on the page');
-    const at = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+    return { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+  }
+
+  /** Drops a file of this computer on the preview, as the desktop does: dragged in, moved, let go. */
+  async look(path: string): Promise<void> {
+    const at = await this.middleOfPreview();
     const data = { items: [], files: [path], dragOperationsMask: COPY };
     const session = await this.page.context().newCDPSession(this.page);
     for (const type of ['dragEnter', 'dragOver', 'drop'] as const)
       await session.send('Input.dispatchDragEvent', { type, ...at, data });
     await session.detach();
-    await expect(this.job.getByRole('heading', { name: basename(path) })).toBeVisible();
   }
 
   /** The number in a `<dt>` … `<dd>` pair of a region, as shown. */
