@@ -49,12 +49,13 @@ function follow(host: InstrumentsHost, span: ReadonlySignal<Seconds>): () => voi
 }
 
 const FAILURES = {
-  missing: 'The graphs are not built yet. Where npm start runs they will be in a few minutes.',
+  missing: 'The graphs are still being built. npm start does it in the background; it takes a few minutes.',
   failed: 'The graphs could not be drawn.',
   unsupported: 'This browser cannot draw in a worker. The values below are the same.',
 } as const;
 
 function Graphs({ span }: { readonly span: ReadonlySignal<Seconds> }): JSX.Element {
+  const around = useRef<HTMLDivElement>(null);
   const place = useRef<HTMLDivElement>(null);
   const state = useSignal<GraphsState>(canDraw() ? 'loading' : 'unsupported');
   const why = useSignal('');
@@ -82,7 +83,7 @@ function Graphs({ span }: { readonly span: ReadonlySignal<Seconds> }): JSX.Eleme
   const failure = now === 'loading' || now === 'ready' ? undefined : FAILURES[now];
   const label = 'Graphs of the temperatures and of the planned speed. The values follow as text.';
   return (
-    <div class="graphs" data-state={now}>
+    <div ref={around} class="graphs" data-state={now} tabIndex={-1}>
       <div ref={place} class="graphs-place" role="img" aria-label={label} hidden={failure !== undefined} />
       {now === 'loading' && (
         <p class="hint graphs-loading" role="status">
@@ -97,6 +98,8 @@ function Graphs({ span }: { readonly span: ReadonlySignal<Seconds> }): JSX.Eleme
             <Button
               onClick={() => {
                 attempt.value += 1;
+                // The button goes away with what it says: whoever pressed it stays here.
+                around.current?.focus();
               }}
             >
               Try again
