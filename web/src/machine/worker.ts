@@ -62,19 +62,15 @@ class FirstBytes {
   }
 }
 
-/** Runs `body` with the lock, or not at all. */
-async function withLock(name: string, body: () => Promise<void>): Promise<boolean> {
-  return await navigator.locks.request(name, { ifAvailable: true }, async (lock) => {
-    if (!lock) return false;
-    await body();
-    return true;
-  });
+/** Runs `body` with the lock, or not at all; why the connection ended. */
+async function withLock(name: string, body: () => Promise<Trouble | null>): Promise<Trouble | null> {
+  return await navigator.locks.request(name, { ifAvailable: true }, (lock) => (lock ? body() : portInUse()));
 }
 
-/** The loop is up: tells the page, until the connection is over. */
+/** The loop is up: tells the page, until the connection is over; returns why it is. */
 function hold(
   make: (over: (trouble: Trouble | null) => void) => Omit<Connection, 'end'> & { stop: () => Promise<void> },
-): Promise<void> {
+): Promise<Trouble | null> {
   return new Promise((resolve) => {
     let over = false;
     const end = async (trouble: Trouble | null): Promise<void> => {
@@ -86,8 +82,7 @@ function hold(
       tellAll();
       await parts.stop();
       parts.machine.free();
-      tell({ kind: 'closed', trouble });
-      resolve();
+      resolve(trouble);
     };
     const parts = make((trouble) => void end(trouble));
     connection = { ...parts, end };
@@ -105,11 +100,11 @@ async function connectSerial(
   loaded: Planner,
   choice: PortChoice & { kind: 'serial' },
   config: string,
-): Promise<void> {
+): Promise<Trouble | null> {
   const port = find(choice.id, await navigator.serial.getPorts());
   if (!port) throw new PortError('port-gone');
   const name = `stepcast-port:${choice.id.vendor}:${choice.id.product}:${choice.id.index}`;
-  const held = await withLock(name, async () => {
+  return await withLock(name, async () => {
     // Before the port is touched: the machine's file may have errors.
     const session = loaded.openSession(config, realNow());
     const transport = await openSerial(port, choice.baud).catch((error: unknown) => {
@@ -119,11 +114,10 @@ async function connectSerial(
     if (opening?.cancelled) {
       session.free();
       await transport.close();
-      tell({ kind: 'closed', trouble: null });
-      return;
+      return null;
     }
     const first = new FirstBytes();
-    await hold((over) => {
+    return await hold((over) => {
       const machine = new Machine(
         session,
         (message) => tell(first.explain(message)),
@@ -146,16 +140,15 @@ async function connectSerial(
       };
     });
   });
-  if (!held) tell({ kind: 'closed', trouble: portInUse() });
 }
 
 async function connectVirtual(
   loaded: Planner,
   choice: PortChoice & { kind: 'virtual' },
   config: string,
-): Promise<void> {
+): Promise<Trouble | null> {
   // Every tab has a printer of its own; the lock only keeps the tab from being frozen.
-  await withLock(`stepcast-virtual:${crypto.randomUUID()}`, () =>
+  return await withLock(`stepcast-virtual:${crypto.randomUUID()}`, () =>
     hold((over) => {
       const printer = loaded.powerUp(config, choice.board, choice.seed, choice.faults);
       const now = (): Seconds => printer.now();
@@ -178,17 +171,21 @@ async function connectVirtual(
 async function connect(message: ToMachine & { kind: 'connect' }): Promise<void> {
   if (connection || opening) return;
   opening = { cancelled: false };
+  const trouble = await carryOut(message);
+  // Only now, with port and lock let go of, may the page ask for the next connection.
+  opening = undefined;
+  tell({ kind: 'closed', trouble });
+}
+
+/** A connection from its beginning to its end; why it ended. */
+async function carryOut(message: ToMachine & { kind: 'connect' }): Promise<Trouble | null> {
   try {
     const loaded = await load();
-    if (message.port.kind === 'serial') await connectSerial(loaded, message.port, message.config);
-    else await connectVirtual(loaded, message.port, message.config);
+    return message.port.kind === 'serial'
+      ? await connectSerial(loaded, message.port, message.config)
+      : await connectVirtual(loaded, message.port, message.config);
   } catch (error) {
-    tell({
-      kind: 'closed',
-      trouble: planner ? (planner.asTrouble(error) ?? portTrouble(error)) : plannerMissing(error),
-    });
-  } finally {
-    opening = undefined;
+    return planner ? (planner.asTrouble(error) ?? portTrouble(error)) : plannerMissing(error);
   }
 }
 
