@@ -78,6 +78,7 @@ export class BridgePort {
   #anchor: { real: number; device: number };
   /** The device's time when its clock was shared; undefined while it is free. */
   #sharedSince: number | undefined;
+  #speed: number;
   #timer: ReturnType<typeof setTimeout> | undefined;
   /** So far the realm lets time pass, ms on the shared clock. */
   #grantedMs: number | undefined;
@@ -87,6 +88,7 @@ export class BridgePort {
     this.device = device;
     this.options = options;
     this.granted = options.granted ?? false;
+    this.#speed = options.speed ?? 1;
     this.#anchor = { real: realS(), device: device.now() };
     this.#timer = setTimeout(this.#tick, TICK_MS);
   }
@@ -206,6 +208,13 @@ export class BridgePort {
     this.#pass();
   }
 
+  /** From now on realm and device go on in real time, each by its own clock. */
+  goOnInRealTime(): void {
+    this.#speed = 1;
+    this.#reanchor();
+    this.#free();
+  }
+
   /** Ends its time. */
   powerDown(): void {
     this.#free();
@@ -283,7 +292,7 @@ export class BridgePort {
 
   #limit(): number {
     const { real, device } = this.#anchor;
-    return device + (realS() - real) * (this.options.speed ?? 1);
+    return device + (realS() - real) * this.#speed;
   }
 
   #reanchor(): void {
@@ -295,7 +304,7 @@ export class BridgePort {
     else {
       this.#advance(this.#limit());
       // Who is faster than real time need not make up for what the computer cannot do.
-      const { speed = 1 } = this.options;
+      const speed = this.#speed;
       if (speed > 1 && this.#limit() - this.device.now() > BEHIND_MAX_S * speed) this.#reanchor();
     }
     this.#timer = setTimeout(this.#tick, TICK_MS);
