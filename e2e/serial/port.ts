@@ -115,6 +115,7 @@ export class BridgePort {
     this.#toHostBytes = 0;
     this.counts.openings += 1;
     this.baudRates.push(baudRate);
+    this.#reanchor();
     this.device.opened?.(baudRate);
     if (this.options.shared) this.#share(holder);
   }
@@ -292,7 +293,9 @@ export class BridgePort {
 
   #limit(): number {
     const { real, device } = this.#anchor;
-    return device + (realS() - real) * this.#speed;
+    // Before anybody has opened it nothing happens that would be worth the work.
+    const speed = this.counts.openings === 0 ? Math.min(1, this.#speed) : this.#speed;
+    return device + (realS() - real) * speed;
   }
 
   #reanchor(): void {
