@@ -50,11 +50,22 @@ impl StepRates {
         for motor in motors {
             let share = delta[motor].abs() / length;
             let z_bound = if motor == 2 { limits.max_z_velocity } else { speed };
-            if share > 0.0 && z_bound.min(speed * share) > self.speed_max[motor] {
+            if share > 0.0 && z_bound.min(speed * share) > self.speed_max[motor] * (1.0 + SLACK) {
                 return Err(too_fast(motor, speed * share, line.0));
             }
         }
         Ok(())
+    }
+
+    /// The highest feed, not above `feed`, that every motor can follow however straight the path is. For moves that are
+    /// faster than the file says because the user wants it so: they are slowed down, not refused.
+    pub fn slowed(&self, from: Position, to: Position, feed: MmPerS) -> MmPerS {
+        let delta: [f64; MOTORS] = core::array::from_fn(|motor| (to[motor] - from[motor]).abs());
+        let travel = delta[..EXTRUDER].iter().map(|d| d * d).sum::<f64>().sqrt();
+        let length = if travel > 0.0 { travel } else { delta[EXTRUDER] };
+        (0..MOTORS)
+            .filter(|&motor| delta[motor] > 0.0)
+            .fold(feed, |feed, motor| feed.min(self.speed_max[motor] * (length / delta[motor])))
     }
 
     /// Refuses a planned move in which a motor would have to step faster than it can.

@@ -64,6 +64,7 @@ const DWELL_IN_RUN_MAX: Seconds = Seconds(2.0);
 struct Said {
     pressure_advance: bool,
     other_fans: bool,
+    slowed: bool,
 }
 
 /// Turns G-code into step commands.
@@ -269,7 +270,7 @@ impl Planner {
                 continue;
             }
             if let Some(chord) = source.next_chord() {
-                self.judge_and_push(&chord, source.e_offset)?;
+                self.judge_and_push(&chord, source)?;
                 continue;
             }
             match source.next() {
@@ -285,7 +286,7 @@ impl Planner {
     fn act(&mut self, action: Action, source: &mut Source) -> Result<(), PrinterError> {
         let line = source.line();
         match action {
-            Action::Move(mv) => self.judge_and_push(&mv, source.e_offset)?,
+            Action::Move(mv) => self.judge_and_push(&mv, source)?,
             Action::Arc(arc) => source.draw(&arc),
             Action::VelocityLimit(limit) => self.limit(limit),
             Action::SetTemperature { heater, target, wait: Wait::No } => {
@@ -377,13 +378,27 @@ impl Planner {
         }
     }
 
-    fn judge_and_push(&mut self, mv: &Move, e_offset: f64) -> Result<(), PrinterError> {
+    fn judge_and_push(&mut self, mv: &Move, source: &Source) -> Result<(), PrinterError> {
+        let e_offset = source.e_offset;
         let to = [mv.to.x, mv.to.y, mv.to.z, mv.to.e + e_offset];
         // Judged from where the machine is, not from where the source believes that it is.
         let [x, y, z, e] = self.position;
         let from = gcode::Position { x, y, z, e: e - e_offset };
         self.guard.judge(&Move { from, ..*mv })?;
-        self.push(to, mv.feed, mv.line)
+        let feed = self.feed(mv, to, source);
+        self.push(to, feed, mv.line)
+    }
+
+    /// A move's feed; one that a factor has made faster than the motors can follow is slowed down to what they can.
+    fn feed(&mut self, mv: &Move, to: Position, source: &Source) -> MmPerS {
+        if source.interpreter.speed_factor() <= 1.0 && source.interpreter.flow_factor() <= 1.0 {
+            return mv.feed;
+        }
+        let feed = self.step_rates.slowed(self.position, to, mv.feed);
+        if feed < mv.feed && !core::mem::replace(&mut self.said.slowed, true) {
+            self.notice(mv.line, "a move is made slower than the factor asks: a motor cannot step faster");
+        }
+        feed
     }
 
     fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
