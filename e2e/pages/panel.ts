@@ -49,7 +49,7 @@ export class Panel {
 
   async open(): Promise<void> {
     await this.page.goto('/');
-    await expect(this.top).toBeVisible();
+    await expect(this.page.getByRole('heading', { name: 'Stepcast' })).toBeVisible();
   }
 
   dialog(name: 'Connect' | 'Machine' | 'Settings'): Locator {

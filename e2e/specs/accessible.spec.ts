@@ -13,6 +13,9 @@ const WINDOWS = {
 const UNKNOWN = 'START_PRINT BED=60';
 const SERIOUS = new Set(['serious', 'critical']);
 
+// A trace would keep a copy of the whole page for each of axe's questions.
+test.use({ trace: 'off' });
+
 /** Transitions would be measured half-way. */
 const still = (page: Page): Promise<void> => page.emulateMedia({ reducedMotion: 'reduce' });
 

@@ -48,8 +48,8 @@ export function TopBar(): JSX.Element {
   return (
     <header class="top-bar">
       <h1 class="brand">
-        <img src="./icon.svg" alt="" width="28" height="28" />
-        <span>Stepcast</span>
+        <img src="./icon.svg" alt="Stepcast" width="28" height="28" />
+        <span aria-hidden="true">Stepcast</span>
       </h1>
       <p class={`status ${status.value.tone}`} role="status">
         <span class="dot" aria-hidden="true" />
