@@ -76,6 +76,8 @@ const steps = [
     name: 'TypeScript tests',
     commands: ['web', 'viz/toolpath'].map((folder) => packaged('vitest/vitest.mjs', 'run', '--root', folder)),
   },
+  // Before the page, which takes them along.
+  { name: 'instruments build', commands: [['cargo', 'xtask', 'instruments']] },
   {
     name: 'page build',
     needs: ['WebAssembly equals native'],
@@ -83,7 +85,7 @@ const steps = [
   },
   {
     name: 'browser tests',
-    needs: ['page build', 'release build'],
+    needs: ['page build', 'instruments build', 'release build'],
     absent: browserAbsent,
     commands: [packaged('@playwright/test/cli.js', 'test', '--config', join('e2e', 'playwright.config.ts'))],
   },
