@@ -82,3 +82,18 @@ test('the 3D view is turned by keyboard and is not a trap', async ({ page, panel
   await page.keyboard.press('Tab');
   await expect(view).not.toBeFocused();
 });
+
+test('a dialog that is closed does not close the next one with it', async ({ page, panel }) => {
+  await panel.openDialog('Machine');
+  // Both in one task: faster than any hand, as a slow computer is.
+  await page.evaluate(() => {
+    const press = (name: string): void =>
+      document.querySelector<HTMLElement>(`button[aria-label="${name}"]`)?.click();
+    press('Close');
+    press('Settings');
+  });
+  await expect(panel.dialog('Machine')).toHaveCount(0);
+  // The browser tells of a dialog's end in a later task: after two pictures it has.
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  await expect(panel.dialog('Settings')).toBeVisible();
+});

@@ -164,7 +164,8 @@ export function Dialog({ title, onClose, children, wide, aside, mayClose }: Dial
       ref={ref}
       class={wide ? 'wide' : ''}
       aria-labelledby={id}
-      onClose={onClose}
+      // The browser tells of the end in a later task, when another dialog may be open already: then it is not this one's.
+      onClose={() => ref.current && onClose()}
       onCancel={(event) => !isFree() && event.preventDefault()}
     >
       <header class="dialog-head">
