@@ -113,6 +113,15 @@ test('speed and fan while printing', async ({ panel, makeFile }) => {
   await expect(panel.motion.getByRole('button', { name: /^Left/ })).toBeDisabled();
 });
 
+test('the virtual printer is made faster while it prints', async ({ panel, makeFile }) => {
+  await panel.connectVirtual('Real time');
+  // Eight minutes: in real time it would still be printing when this test is over.
+  await panel.drop(makeFile('travels.gcode', travels(300).gcode));
+  await panel.startPrint();
+  await panel.tuning.getByText('up to 200×').click();
+  await expect(panel.job).toContainText('The print is done', { timeout: 50_000 });
+});
+
 test('the console: sends, answers, says what it does not know, remembers', async ({ panel }) => {
   await panel.connectVirtual(BY_HAND);
   await panel.send('G28 X');

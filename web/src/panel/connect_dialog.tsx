@@ -4,19 +4,19 @@ import type { JSX } from 'preact';
 import { useEffect, useId } from 'preact/hooks';
 import { connect, plannerFailed, plannerLoaded, refusePort } from '../state/machine';
 import { activeProfile, profiles, SHIPPED } from '../state/profiles';
-import { change, SPEED_MAX, settings } from '../state/settings';
+import { change, settings } from '../state/settings';
 import { identify, type PortId } from '../transport/web_serial';
 import { faultProblem } from './faults';
 import { machineSummary } from './machine_summary';
 import { Button, Choice, Dialog, NumberField } from './parts';
 import { openDialog } from './top_bar';
+import { VirtualSpeed } from './virtual_speed';
 
 const HAS_SERIAL = 'serial' in navigator;
 const FAULTS_EXAMPLE = 'sensor-open=extruder@90';
 const FAULTS_CHARACTERS_MAX = 500;
 const FAULTS_HINT =
   'What breaks, and at which second after power-up: sensor-open, sensor-short, heater-dead, heater-stuck-on (=extruder or heater_bed), endstop-stuck-on, endstop-stuck-off (=x, y or z), unplug, replug. Damage to the bytes all the time: corrupt, drop, duplicate, delay (=probability). Several are separated by commas.';
-const SPEEDS = [1, 5, 20, SPEED_MAX] as const;
 
 const known = signal<readonly SerialPort[]>([]);
 const chosen = signal<SerialPort | null>(null);
@@ -118,12 +118,7 @@ function Virtual(): JSX.Element {
         A whole printer inside this page: the same firmware, heaters that warm up, motors that move. Nothing
         real gets warm. It is built from the machine file in use and is gone when the page is closed.
       </p>
-      <Choice
-        label="Speed"
-        choices={SPEEDS.map((value) => ({ value, text: value === 1 ? 'Real time' : `up to ${value}×` }))}
-        value={(SPEEDS.find((value) => value === settings.value.speed) ?? 1) as (typeof SPEEDS)[number]}
-        onSet={(speed) => change({ speed })}
-      />
+      <VirtualSpeed label="Speed" />
       <details class="more">
         <summary>Try faults out</summary>
         <div class="stack">
