@@ -97,3 +97,37 @@ test('a dialog that is closed does not close the next one with it', async ({ pag
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
   await expect(panel.dialog('Settings')).toBeVisible();
 });
+
+test('a dialog that is opened twice by Enter stops nothing', async ({ page, panel, makeFile }) => {
+  await panel.connectVirtual('up to 20×');
+  await panel.drop(makeFile('travels.gcode', travels(3000).gcode));
+  await panel.startPrint();
+  await expect(panel.fact(panel.job, 'Line')).toHaveText(/[1-9]\d/);
+
+  const cancel = panel.job.getByRole('button', { name: 'Cancel' });
+  await cancel.focus();
+  await page.keyboard.press('Enter');
+  const question = page.getByRole('dialog', { name: 'End the print?' });
+  await expect(question.getByRole('button', { name: 'Go on printing' })).toBeFocused();
+  await page.keyboard.press('Enter');
+  await expect(question).toHaveCount(0);
+  await expect(cancel).toBeFocused();
+
+  for (const name of ['Settings', 'Machine'] as const) {
+    await panel.top.getByRole('button', { name, exact: true }).focus();
+    await page.keyboard.press('Enter');
+    const dialog = panel.dialog(name);
+    await expect(dialog.getByRole('heading', { name, exact: true })).toBeFocused();
+    await page.keyboard.press('Enter');
+    await page.keyboard.press('Space');
+    await expect(dialog).toBeVisible();
+    await page.keyboard.press('Escape');
+    await expect(dialog).toHaveCount(0);
+  }
+  const line = async (): Promise<number> =>
+    Number((await panel.fact(panel.job, 'Line').innerText()).replace(',', ''));
+  const before = await line();
+  await expect.poll(line).toBeGreaterThan(before);
+  await expect(panel.status).toContainText('Printing');
+  await expect(panel.messages).not.toContainText('Emergency stop pressed');
+});

@@ -1,5 +1,5 @@
 // Small parts that all panels are made of. Know nothing of printers.
-import type { ComponentChildren, JSX } from 'preact';
+import type { ComponentChildren, JSX, RefObject } from 'preact';
 import { useEffect, useId, useRef, useState } from 'preact/hooks';
 import { Icon, type IconName } from './icons';
 import { formatNumber, parseNumber } from './numbers';
@@ -35,6 +35,7 @@ interface ButtonProps {
   readonly why?: string | null;
   readonly pressed?: boolean;
   readonly class?: string;
+  readonly place?: RefObject<HTMLButtonElement | null>;
 }
 
 /** A button; with `label` instead of words it is an icon with a name. */
@@ -48,9 +49,11 @@ export function Button({
   why,
   pressed,
   class: more = '',
+  place,
 }: ButtonProps): JSX.Element {
   return (
     <button
+      ref={place ?? null}
       type="button"
       class={`button ${kind} ${children ? '' : 'only-icon'} ${more}`}
       onClick={onClick}
@@ -147,17 +150,29 @@ export interface DialogProps {
   readonly aside?: ComponentChildren;
   /** Asked before Escape and the cross close the dialog. */
   readonly mayClose?: () => boolean;
+  /** What has the focus at first; without it the title. */
+  readonly first?: RefObject<HTMLElement | null>;
 }
 
-/** A modal dialog; Escape and the cross close it, and the focus goes back to where it was. */
-export function Dialog({ title, onClose, children, wide, aside, mayClose }: DialogProps): JSX.Element {
+/**
+ * A modal dialog; Escape and the cross close it, and the focus goes back to where it was. The browser would focus the
+ * first button, which is the emergency stop in most dialogs: a second Enter would stop the print.
+ */
+export function Dialog({ title, onClose, children, wide, aside, mayClose, first }: DialogProps): JSX.Element {
   const ref = useRef<HTMLDialogElement>(null);
+  const heading = useRef<HTMLHeadingElement>(null);
   const id = useId();
   useEffect(() => {
     const dialog = ref.current;
+    const before = document.activeElement;
     dialog?.showModal();
-    return () => dialog?.close();
-  }, []);
+    (first ?? heading).current?.focus();
+    return () => {
+      dialog?.close();
+      // It is out of the page by now: the browser gives the focus back only from a dialog that is still there.
+      if (before instanceof HTMLElement && document.activeElement === document.body) before.focus();
+    };
+  }, [first]);
   const isFree = (): boolean => mayClose?.() ?? true;
   return (
     <dialog
@@ -169,7 +184,9 @@ export function Dialog({ title, onClose, children, wide, aside, mayClose }: Dial
       onCancel={(event) => !isFree() && event.preventDefault()}
     >
       <header class="dialog-head">
-        <h2 id={id}>{title}</h2>
+        <h2 id={id} ref={heading} tabIndex={-1}>
+          {title}
+        </h2>
         {aside}
         <Button icon="close" label="Close" kind="quiet" onClick={() => isFree() && onClose()} />
       </header>
