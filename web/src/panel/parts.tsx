@@ -79,25 +79,56 @@ interface NumberFieldProps {
   /** Why the field cannot be used now; null where it can. */
   readonly why?: string | null;
   readonly hideLabel?: boolean;
-  /** Called with a number between `min` and `max`, on Enter and on leaving the field after a change. */
+  /** What is set acts on the machine: only Enter and the button pass it on, and leaving the field puts it away. */
+  readonly acts?: boolean;
+  /** Called with a number between `min` and `max`: on Enter, and, unless it `acts`, on leaving the field after a change. */
   readonly onSet: (value: number) => void;
+}
+
+interface Draft {
+  /** What is typed and not yet set. */
+  readonly text: string | null;
+  readonly isWrong: boolean;
+  readonly set: (text: string | null) => void;
+  readonly commit: () => void;
+  readonly leave: () => void;
+}
+
+function useDraft({ value, min, max, acts, onSet }: NumberFieldProps, isOff: boolean): Draft {
+  const [text, set] = useState<string | null>(null);
+  const number = text === null ? value : parseNumber(text);
+  const isWrong = number === undefined || number < min || number > max;
+  // A field that is switched off is not left: the browser says nothing.
+  useEffect(() => {
+    if (isOff) set(null);
+  }, [isOff]);
+  const commit = (): void => {
+    if (text === null || isWrong || isOff) return;
+    set(null);
+    onSet(number);
+  };
+  const leave = (): void => {
+    if (!acts) commit();
+    set(null);
+  };
+  return { text, isWrong, set, commit, leave };
 }
 
 /** A number to type, with its unit; what is no number, or out of range, is said and not passed on. */
 export function NumberField(props: NumberFieldProps): JSX.Element {
-  const { label, unit, value, min, max, decimals = 0, disabled, why, hideLabel, onSet } = props;
+  const { label, unit, value, min, max, decimals = 0, disabled, why, hideLabel, acts } = props;
   const id = useId();
-  const [draft, setDraft] = useState<string | null>(null);
-  const number = draft === null ? value : parseNumber(draft);
-  const isWrong = number === undefined || number < min || number > max;
+  const isOff = Boolean(disabled || why);
+  const { text, isWrong, set, commit, leave } = useDraft(props, isOff);
   const hint = `From ${formatNumber(min, decimals, 0)} to ${formatNumber(max, decimals, 0)} ${unit}`;
-  const commit = (): void => {
-    if (draft === null || isWrong) return;
-    setDraft(null);
-    onSet(number);
-  };
   return (
-    <span class="number-field">
+    <span
+      class="number-field"
+      onFocusOut={(event) => {
+        const to = event.relatedTarget;
+        if (!(to instanceof Node && event.currentTarget.contains(to))) leave();
+      }}
+    >
       <label for={id} class={hideLabel ? 'unseen' : ''}>
         {label}
       </label>
@@ -107,30 +138,30 @@ export function NumberField(props: NumberFieldProps): JSX.Element {
           type="text"
           inputMode="decimal"
           autocomplete="off"
-          value={draft ?? formatNumber(value, decimals, 0)}
-          disabled={disabled || Boolean(why)}
+          value={text ?? formatNumber(value, decimals, 0)}
+          disabled={isOff}
           title={why ?? undefined}
           aria-invalid={isWrong}
           aria-describedby={isWrong ? `${id}-hint` : undefined}
           onFocus={(event) => event.currentTarget.select()}
-          onInput={(event) => setDraft(event.currentTarget.value)}
-          onBlur={() => {
-            commit();
-            setDraft(null);
-          }}
+          onInput={(event) => set(event.currentTarget.value)}
           onKeyDown={(event) => {
             if (event.key === 'Enter') {
               event.preventDefault();
               commit();
-            } else if (event.key === 'Escape' && draft !== null) {
+            } else if (event.key === 'Escape' && text !== null) {
               event.stopPropagation();
-              setDraft(null);
+              set(null);
             }
           }}
         />
-        <span class="unit" aria-hidden="true">
-          {unit}
-        </span>
+        {acts && text !== null ? (
+          <SetButton label={label} disabled={isWrong} onClick={commit} />
+        ) : (
+          <span class="unit" aria-hidden="true">
+            {unit}
+          </span>
+        )}
       </span>
       {isWrong && (
         <span class="field-hint" id={`${id}-hint`}>
@@ -138,6 +169,29 @@ export function NumberField(props: NumberFieldProps): JSX.Element {
         </span>
       )}
     </span>
+  );
+}
+
+interface SetButtonProps {
+  readonly label: string;
+  readonly disabled: boolean;
+  readonly onClick: () => void;
+}
+
+/** Passes a typed number on, for those without an Enter key at hand. */
+function SetButton({ label, disabled, onClick }: SetButtonProps): JSX.Element {
+  return (
+    <button
+      type="button"
+      class="number-set"
+      aria-label={`Set ${label}`}
+      disabled={disabled}
+      // The field keeps the focus, and with it what is typed.
+      onMouseDown={(event) => event.preventDefault()}
+      onClick={onClick}
+    >
+      Set
+    </button>
   );
 }
 

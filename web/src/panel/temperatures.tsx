@@ -64,6 +64,7 @@ function Heater({ name, heater }: HeaterProps): JSX.Element {
         min={0}
         max={max}
         why={notReady.value}
+        acts
         onSet={(target) => setTarget(name, target)}
       />
       <Button

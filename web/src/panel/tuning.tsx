@@ -25,6 +25,7 @@ export function Tuning(): JSX.Element {
       min={min}
       max={max}
       why={notReady.value}
+      acts
       onSet={(set) => void wish({ kind, value: share(set / 100) })}
     />
   );
