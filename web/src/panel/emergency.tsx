@@ -13,7 +13,7 @@ export function EmergencyStop(): JSX.Element {
       class="emergency"
       aria-label="Emergency stop"
       title={isOff ? 'Nothing is connected' : 'Stops the motors and switches the heaters off, at once'}
-      onClick={emergencyStop}
+      onClick={() => void emergencyStop()}
       disabled={isOff}
     >
       <Icon name="stop" />
