@@ -1,5 +1,5 @@
-// The worker that drives the printer stops in the middle of a print: the page says so, lets go of the printer, and goes
-// on with a new worker. The planner's failure is a real one's: from some call on, nothing of it answers any more.
+// The worker that drives the printer stops in the middle of a print, or hangs: the page says so, lets go of the
+// printer, and goes on with a new worker.
 import type { Worker } from '@playwright/test';
 import { travels } from '../fixtures/gcode.ts';
 import { expect, type SerialPanel, test } from '../fixtures/serial.ts';
@@ -8,7 +8,6 @@ import { PrinterDevice } from '../serial/printer.ts';
 
 const FAST = { vendor: 0x1d50, product: 0x614e, shared: true, speed: 50 } as const;
 
-/** The machine's worker: the one that holds the lock of the connection. */
 async function machineWorker(panel: SerialPanel): Promise<Worker> {
   for (const worker of panel.page.workers()) {
     if ((await worker.evaluate(() => self.name)) === 'machine') return worker;
@@ -16,11 +15,13 @@ async function machineWorker(panel: SerialPanel): Promise<Worker> {
   throw new Error('there is no worker of that name');
 }
 
-/** From now on the planner's answers cannot be read. */
+/** From now on the planner fails whenever it is asked how things are. */
 const breakPlanner = (worker: Worker): Promise<void> =>
   worker.evaluate(() => {
-    JSON.parse = () => {
-      throw new WebAssembly.RuntimeError('unreachable');
+    const parse = JSON.parse;
+    JSON.parse = (text: string) => {
+      if (text.includes('"temperatures"')) throw new WebAssembly.RuntimeError('unreachable');
+      return parse(text) as unknown;
     };
   });
 
@@ -90,4 +91,20 @@ test('a worker that hangs: what is shown is marked as old, and disconnecting end
   await panel.top.getByRole('button', { name: 'Disconnect' }).click();
   await expect(panel.status).toContainText('Not connected');
   await panel.connectVirtual();
+});
+
+test('an emergency stop before the board is known is sent as soon as it is', async ({ bridge, open }) => {
+  const printer = new PrinterDevice();
+  const port = bridge.add(printer, FAST);
+  const panel = await open();
+  port.isMute = true;
+  await panel.pickAndConnect(bridge, port);
+  await expect(panel.messages).toContainText('asking the board who it is');
+  await panel.emergencyStop.click();
+  await expect(panel.alert).toContainText('No emergency stop could be sent: the board has not said yet');
+  expect(printer.state().shutdown).toBeNull();
+  port.isMute = false;
+  await expect(panel.status).toContainText('Stopped');
+  await expect(panel.alert).toContainText('The emergency stop was asked for.');
+  await expect.poll(() => printer.state().shutdown).not.toBeNull();
 });
