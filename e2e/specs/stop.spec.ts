@@ -59,9 +59,20 @@ test('emergency stop by keyboard alone', async ({ panel, makeFile }) => {
 test('emergency stop from inside a dialog', async ({ panel, makeFile }) => {
   await printing(panel, makeFile, LONG);
   const dialog = await panel.openDialog('Settings');
+  await expect(dialog.getByRole('alert')).toBeEmpty();
   await dialog.getByRole('button', { name: 'Emergency stop' }).click();
+  // What lies behind the dialog cannot be reached.
+  await expect(dialog.getByRole('alert')).toContainText('The emergency stop was asked for.');
+  await expect(dialog.getByRole('button', { name: 'Restart the board' })).toBeVisible();
   await panel.closeDialog(dialog);
   await expectStopped(panel);
+  // The message may be put away; the way on stays.
+  await panel.alert.getByRole('button', { name: 'Put this message away' }).click();
+  await expect(panel.alert).not.toContainText('The emergency stop was asked for.');
+  await expect(panel.alert).toContainText('The board has stopped.');
+  await panel.alert.getByRole('button', { name: 'Restart the board' }).click();
+  await expect(panel.status).toContainText('Ready');
+  await expect(panel.alert).toBeEmpty();
 });
 
 test('pause, move by hand, resume: the print ends where it should', async ({ panel, makeFile }) => {

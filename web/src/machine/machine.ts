@@ -4,7 +4,7 @@
 // clocks nor ports.
 import { type Seconds, seconds } from '../units';
 import { Feeder } from './feeder';
-import type { FromMachine, MachineEvent, Trouble, WakeUps, Wish } from './protocol';
+import type { ConfirmedLines, FromMachine, MachineEvent, Trouble, WakeUps, Wish } from './protocol';
 import type { Session } from './session';
 import { fileBrokeOff, fileUnreadable, stopNotSent } from './troubles';
 
@@ -139,7 +139,7 @@ export class Machine {
   }
 
   /** Starts a print. `now` is asked for once the file is open. */
-  async print(file: Blob, confirmedLines: readonly number[], now: () => Seconds): Promise<Trouble | null> {
+  async print(file: Blob, confirmedLines: ConfirmedLines, now: () => Seconds): Promise<Trouble | null> {
     if (this.#starting) return null;
     this.#starting = true;
     try {
@@ -153,7 +153,7 @@ export class Machine {
     }
   }
 
-  #begin(feeder: Feeder, confirmedLines: readonly number[], now: () => Seconds): Trouble | null {
+  #begin(feeder: Feeder, confirmedLines: ConfirmedLines, now: () => Seconds): Trouble | null {
     if (this.#freed) return null;
     if (feeder.failure !== undefined) return fileUnreadable(feeder.failure);
     const trouble = this.session.startJob(confirmedLines, now());

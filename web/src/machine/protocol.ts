@@ -107,6 +107,9 @@ export type PortChoice =
       readonly faults: string;
     };
 
+/** Lines that the user wants left out; all that are not known, where there are more than can be listed. */
+export type ConfirmedLines = readonly number[] | 'all';
+
 export type ToMachine =
   | { readonly kind: 'connect'; readonly port: PortChoice; readonly config: string }
   | { readonly kind: 'disconnect' }
@@ -115,7 +118,7 @@ export type ToMachine =
       readonly kind: 'print';
       readonly id: number;
       readonly file: Blob;
-      readonly confirmedLines: readonly number[];
+      readonly confirmedLines: ConfirmedLines;
     }
   | { readonly kind: 'speed'; readonly speed: number }
   /** A snapshot has arrived: the next may be sent. */

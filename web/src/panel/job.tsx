@@ -2,17 +2,9 @@
 import { computed } from '@preact/signals';
 import type { ComponentChildren, JSX } from 'preact';
 import type { Summary } from '../preview/protocol';
+import { unconfirmed } from '../state/confirm';
 import { connection, isPrinting, isReady, job, outcome, snapshot, wish } from '../state/machine';
-import {
-  closeFile,
-  failure,
-  file,
-  type OpenFile,
-  openFile,
-  reading,
-  summary,
-  unconfirmed,
-} from '../state/preview';
+import { closeFile, failure, file, type OpenFile, openFile, reading, summary } from '../state/preview';
 import {
   finishesIn,
   heatingUp,
@@ -44,8 +36,8 @@ const obstacle = computed<string | null>(() => {
   const open = unconfirmed.value.length;
   if (open > 0)
     return open === 1
-      ? 'A line has to be confirmed first: see below.'
-      : `${open} lines have to be confirmed first: see below.`;
+      ? 'A command has to be confirmed first: see below.'
+      : `${open} commands have to be confirmed first: see below.`;
   return null;
 });
 

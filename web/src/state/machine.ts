@@ -3,6 +3,7 @@
 import { computed, signal } from '@preact/signals';
 import type { VirtualState } from '../bindings/VirtualState';
 import type {
+  ConfirmedLines,
   FromMachine,
   MachineEvent,
   PortChoice,
@@ -270,7 +271,7 @@ export async function wish(wanted: Wish): Promise<boolean> {
   return isDone(await ask((id) => ({ kind: 'wish', id, wish: wanted })));
 }
 
-export async function print(file: Blob, confirmedLines: readonly number[]): Promise<boolean> {
+export async function print(file: Blob, confirmedLines: ConfirmedLines): Promise<boolean> {
   outcome.value = null;
   isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, confirmedLines })));
   return isBegun;

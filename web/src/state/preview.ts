@@ -1,6 +1,6 @@
 // The file that is shown and may be printed: its reading, what was found in it, what the user has confirmed.
 // The other end is the preview worker, which never disturbs a running print.
-import { computed, effect, signal } from '@preact/signals';
+import { effect, signal } from '@preact/signals';
 import type { Trouble } from '../machine/protocol';
 import { previewDied } from '../machine/troubles';
 import type { ConfigReport, FromPreview, Summary, ToPreview, VertexHeader } from '../preview/protocol';
@@ -27,10 +27,6 @@ export const reading = signal<number | null>(null);
 export const summary = signal<Summary | null>(null);
 export const failure = signal<Trouble | null>(null);
 export const confirmed = signal<ReadonlySet<number>>(new Set());
-
-export const unconfirmed = computed(() =>
-  (summary.value?.blocking ?? []).filter((remark) => !confirmed.value.has(remark.line)),
-);
 
 /** A worker that stops this often without having read anything in between is not started again. */
 const DEATHS_MAX = 3;
@@ -146,13 +142,6 @@ export function closeFile(): void {
   summary.value = null;
   failure.value = null;
   sink?.clear();
-}
-
-export function confirmLine(line: number, yes: boolean): void {
-  const lines = new Set(confirmed.value);
-  if (yes) lines.add(line);
-  else lines.delete(line);
-  confirmed.value = lines;
 }
 
 /** Reads a printer.cfg and says what is wrong with it, by line. */
