@@ -28,7 +28,7 @@ export class RealTimeLoop {
     this.#reader = transport.readable.getReader();
   }
 
-  /** `onFailure` is told what was thrown by whoever this calls; the loop goes on then only if it is told to. */
+  /** `onFailure` is told what was thrown by the machine. */
   start(onFailure: (error: unknown) => void): void {
     this.#onFailure = onFailure;
     void this.#read();
