@@ -75,6 +75,23 @@ test('emergency stop from inside a dialog', async ({ panel, makeFile }) => {
   await expect(panel.alert).toBeEmpty();
 });
 
+test('a double click on Print starts the print and does not pause it', async ({ panel, makeFile }) => {
+  await panel.connectVirtual('up to 20×');
+  await panel.drop(makeFile('travels.gcode', LONG.gcode));
+  await expect(panel.print).toBeEnabled();
+  await panel.print.dblclick({ delay: 60 });
+  await expect(panel.status).toContainText('Printing');
+  const pause = panel.job.getByRole('button', { name: 'Pause' });
+  // Just after the change, too.
+  await pause.dispatchEvent('click');
+  await expect(pause).toBeEnabled();
+  await expect(panel.fact(panel.job, 'Line')).toHaveText(/[1-9]\d/);
+  await expect(panel.status).toContainText('Printing');
+  await expect(panel.messages).not.toContainText('Paused.');
+  await pause.click();
+  await expect(panel.status).toContainText('Paused', { timeout: 30_000 });
+});
+
 test('pause, move by hand, resume: the print ends where it should', async ({ panel, makeFile }) => {
   test.setTimeout(120_000);
   await printing(panel, makeFile, SHORT);

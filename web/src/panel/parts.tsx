@@ -2,7 +2,7 @@
 import type { ComponentChildren, JSX, RefObject } from 'preact';
 import { useEffect, useId, useRef, useState } from 'preact/hooks';
 import { Icon, type IconName } from './icons';
-import { formatNumber, parseNumber } from './numbers';
+import { formatPlain, parseNumber } from './numbers';
 
 interface CardProps {
   readonly title: string;
@@ -34,6 +34,8 @@ interface ButtonProps {
   /** Why the button cannot be used now; null where it can. */
   readonly why?: string | null;
   readonly pressed?: boolean;
+  /** Presses are passed over for now. Keeps the focus, which a disabled button loses. */
+  readonly busy?: boolean;
   readonly class?: string;
   readonly place?: RefObject<HTMLButtonElement | null>;
 }
@@ -48,6 +50,7 @@ export function Button({
   disabled,
   why,
   pressed,
+  busy = false,
   class: more = '',
   place,
 }: ButtonProps): JSX.Element {
@@ -56,8 +59,9 @@ export function Button({
       ref={place ?? null}
       type="button"
       class={`button ${kind} ${children ? '' : 'only-icon'} ${more}`}
-      onClick={onClick}
+      onClick={() => !busy && onClick()}
       disabled={disabled || Boolean(why)}
+      aria-disabled={busy || undefined}
       aria-label={label}
       aria-pressed={pressed}
       title={why ?? (children ? undefined : label)}
@@ -120,7 +124,7 @@ export function NumberField(props: NumberFieldProps): JSX.Element {
   const id = useId();
   const isOff = Boolean(disabled || why);
   const { text, isWrong, set, commit, leave } = useDraft(props, isOff);
-  const hint = `From ${formatNumber(min, decimals, 0)} to ${formatNumber(max, decimals, 0)} ${unit}`;
+  const hint = `From ${formatPlain(min, decimals)} to ${formatPlain(max, decimals)} ${unit}`;
   return (
     <span
       class="number-field"
@@ -138,7 +142,7 @@ export function NumberField(props: NumberFieldProps): JSX.Element {
           type="text"
           inputMode="decimal"
           autocomplete="off"
-          value={text ?? formatNumber(value, decimals, 0)}
+          value={text ?? formatPlain(value, decimals)}
           disabled={isOff}
           title={why ?? undefined}
           aria-invalid={isWrong}
