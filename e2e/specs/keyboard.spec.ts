@@ -55,10 +55,15 @@ test('connects, opens a file, prints, pauses, resumes and sees the end', async (
   await page.keyboard.press('Enter');
   await expect(panel.status).toContainText('Printing');
 
-  await tabTo(page, panel.job.getByRole('button', { name: 'Pause' }));
+  const pause = panel.job.getByRole('button', { name: 'Pause' });
+  await tabTo(page, pause);
+  // Not before the press on Print, in the same place, is over.
+  await expect(pause).toBeEnabled();
   await page.keyboard.press('Space');
   await expect(panel.status).toContainText('Paused', { timeout: 30_000 });
-  await tabTo(page, panel.job.getByRole('button', { name: 'Resume' }));
+  const resume = panel.job.getByRole('button', { name: 'Resume' });
+  await tabTo(page, resume);
+  await expect(resume).toBeEnabled();
   await page.keyboard.press('Space');
   await expect(panel.job).toContainText('The print is done.', { timeout: 60_000 });
 });
