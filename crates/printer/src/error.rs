@@ -248,7 +248,9 @@ impl From<ShutdownReason> for ErrorCode {
             | R::InvalidPwm
             | R::InvalidAdcTiming
             | R::InvalidTrsync
-            | R::InvalidEndstop => Self::ProtocolFault,
+            | R::InvalidEndstop
+            | R::InvalidMotion
+            | R::MotionNotHeld => Self::ProtocolFault,
         }
     }
 }

@@ -15,9 +15,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     messages::{Command, CommandKind, DecodeError, MessageSpec, Response, ResponseKind, decode_id},
-    shutdown::ShutdownReason,
     vlq::{self, Sink},
 };
+
+mod description;
+
+pub use description::{Description, MOTION_CLOCK};
 
 /// The largest dictionary that is accepted once unpacked: real ones are below 64 KiB.
 pub const DICTIONARY_BYTES_MAX: usize = 1 << 20;
@@ -80,58 +83,6 @@ struct Json {
     output: BTreeMap<String, i32>,
     #[serde(default)]
     enumerations: BTreeMap<String, BTreeMap<String, EnumerationValue>>,
-}
-
-/// What a board says of itself, apart from the messages, which are the same on all of ours.
-#[derive(Clone, Debug, Default)]
-pub struct Description {
-    /// The firmware's version.
-    pub version: String,
-    /// Tool versions.
-    pub build_versions: String,
-    /// Constants such as `CLOCK_FREQ`.
-    pub constants: Vec<(String, Constant)>,
-    /// Pin names: the first name of a row, its value, how many there are.
-    pub pins: Vec<(String, u8, u8)>,
-}
-
-impl Description {
-    /// The dictionary as JSON.
-    pub fn json(&self) -> String {
-        let formats = |specs: &mut dyn Iterator<Item = MessageSpec>| -> BTreeMap<String, i32> {
-            specs.map(|spec| (format_of(&spec), i32::from(spec.id))).collect()
-        };
-        let pins = self.pins.iter().map(|(name, first, count)| {
-            let value = match count {
-                1 => EnumerationValue::One(i64::from(*first)),
-                _ => EnumerationValue::Row([i64::from(*first), i64::from(*count)]),
-            };
-            (name.clone(), value)
-        });
-        let reasons = ShutdownReason::ALL
-            .iter()
-            .map(|&reason| (reason.text().to_owned(), EnumerationValue::One(i64::from(reason as u16))));
-        let json = Json {
-            version: self.version.clone(),
-            build_versions: self.build_versions.clone(),
-            config: self.constants.iter().cloned().collect(),
-            commands: formats(&mut CommandKind::ALL.iter().map(|kind| kind.spec())),
-            responses: formats(&mut ResponseKind::ALL.iter().map(|kind| kind.spec())),
-            output: BTreeMap::new(),
-            enumerations: [
-                ("pin".to_owned(), pins.collect()),
-                ("static_string_id".to_owned(), reasons.collect()),
-            ]
-            .into(),
-        };
-        serde_json::to_string(&json).expect("maps of strings and numbers are always JSON")
-    }
-
-    /// The dictionary as it travels.
-    pub fn compressed(&self) -> Vec<u8> {
-        const LEVEL: u8 = 9;
-        miniz_oxide::deflate::compress_to_vec_zlib(self.json().as_bytes(), LEVEL)
-    }
 }
 
 fn format_of(spec: &MessageSpec) -> String {
@@ -414,6 +365,7 @@ mod tests {
                 ("MCU".into(), Constant::Text("rp2040".into())),
             ],
             pins: vec![("gpio0".into(), 0, 30), ("LED".into(), 40, 1)],
+            motion_clock: true,
         };
         Dictionary::parse(&description.compressed()).unwrap()
     }
@@ -429,6 +381,19 @@ mod tests {
         assert_eq!(dictionary.pin("LED"), Some(40));
         assert_eq!(dictionary.enumeration_name("static_string_id", 3), Some("Timer too close"));
         assert_eq!(dictionary.require(CommandKind::ALL), Ok(()));
+    }
+
+    #[test]
+    fn a_plain_board_does_not_have_the_extension() {
+        let plain = Dictionary::parse(&Description::default().compressed()).unwrap();
+        assert_eq!(plain.number(MOTION_CLOCK), None);
+        assert!(plain.supports(CommandKind::UpdateDigitalOut) && !plain.supports(CommandKind::MotionHold));
+        let state = Response::MotionState { clock: 1, motion: 2, rate: 3, state: 0, reason: 0 };
+        let mut bytes = vec![];
+        state.encode(&mut bytes);
+        assert!(plain.decode(&mut &bytes[..]).is_err());
+        assert_eq!(ours().decode(&mut &bytes[..]), Ok(Received::Known(state)));
+        assert_eq!(ours().number(MOTION_CLOCK), Some(1.0));
     }
 
     #[test]

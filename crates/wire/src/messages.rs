@@ -285,6 +285,37 @@ messages! {
     QueueDigitalOut "queue_digital_out" { oid: u8, clock: u32, on_ticks: u32 }
     /// Sets an output now.
     UpdateDigitalOut "update_digital_out" { oid: u8, value: u8 }
+
+    // The motion clock, an extension of ours (docs/motion-clock.md). What plain boards also have stays before it, so
+    // that it keeps its numbers.
+    /// Renews the lease on motion: steps are queued up to the motion clock `covered`, the host lives until the clock
+    /// `alive`; motion comes to rest by a ramp of `ramp` ticks when either runs out.
+    MotionLease "motion_lease" { covered: u32, alive: u32, ramp: u32 }
+    /// The motion clock at which all that is queued has come to rest by itself: there the lease ends.
+    MotionEnd "motion_end" { clock: u32 }
+    /// Slows the motion clock to a stop.
+    MotionHold "motion_hold" { ramp: u32 }
+    /// Speeds the motion clock up again.
+    MotionResume "motion_resume" { ramp: u32 }
+    /// The rate of the motion clock while it is not held, in 1/4096 of the clock's.
+    MotionRate "motion_rate" { rate: u16, ramp: u32 }
+    /// Asks for the state of the motion clock.
+    MotionGetState "motion_get_state" {}
+    /// While held: drops all queued steps and tied output changes; every stepper tells how far it came.
+    MotionDrop "motion_drop" {}
+    /// Begins a new count of rows on every stepper.
+    MotionJob "motion_job" { id: u32 }
+    /// An output's queued changes follow the motion clock.
+    MotionTie "motion_tie" { oid: u8 }
+    /// Asks how far a stepper has come in its rows.
+    StepperGetQueue "stepper_get_queue" { oid: u8 }
+}
+
+impl CommandKind {
+    /// Whether a board with plain Klipper firmware lacks this command.
+    pub const fn is_extension(self) -> bool {
+        self as u16 >= Self::MotionLease as u16
+    }
 }
 
 messages! {
@@ -315,6 +346,22 @@ messages! {
     IsShutdown "is_shutdown" { static_string_id: u16 }
     /// The firmware has just started.
     Starting "starting" {}
+
+    // The motion clock, as above.
+    /// At the clock `clock` the motion clock stood at `motion` and ran at `rate`/4096; why it is or will be held.
+    MotionState "motion_state" { clock: u32, motion: u32, rate: u16, state: u8, reason: u8 }
+    /// How far a stepper has come in its job: rows, steps left in the current row, the motion clock and direction of
+    /// the next step, position, and the check over all rows received.
+    StepperQueue "stepper_queue" {
+        oid: u8, job: u32, received: u32, done: u32, left: u16, next: u32, dir: u8, pos: i32, crc: u32
+    }
+}
+
+impl ResponseKind {
+    /// Whether a board with plain Klipper firmware lacks this message.
+    pub const fn is_extension(self) -> bool {
+        self as u16 >= Self::MotionState as u16
+    }
 }
 
 #[cfg(test)]

@@ -70,4 +70,8 @@ reasons! {
     InvalidTrsync = 23, "Invalid trsync parameters";
     /// The sampling commands of an endstop make no sense.
     InvalidEndstop = 24, "Invalid endstop sampling parameters";
+    /// A ramp, rate or tie that the motion clock cannot have.
+    InvalidMotion = 25, "Invalid motion clock parameters";
+    /// `motion_drop` while the motion clock is not held.
+    MotionNotHeld = 26, "Motion clock is not held";
 }

@@ -1,4 +1,5 @@
-//! Outputs: heaters, fans, enable pins. Switched at a clock, or pulse-width modulated by timers.
+//! Outputs: heaters, fans, enable pins. Switched at a clock, or pulse-width modulated by timers. What is queued for an
+//! output that is tied to motion is due on the motion clock; the modulation itself is always on the hardware clock.
 //!
 //! An output with a `max_duration` that is not at its default has to be set again within that time, else the board
 //! stops: a host that died must not leave a heater on.
@@ -8,6 +9,7 @@ use wire::ShutdownReason;
 
 use crate::{
     board::{Board, Pin},
+    motion_clock::MotionClock,
     moves::{MovePool, OutputMove, Queue},
     objects::After,
 };
@@ -27,8 +29,10 @@ pub(crate) struct DigitalOut {
     off_ticks: u32,
     /// The next edge of the modulation.
     toggle_at: Option<Clock32>,
-    /// When the next queued change is due or, with none queued, when `max_duration` ends.
+    /// When the next queued change is due or, with none queued, when `max_duration` ends. On the motion clock for an
+    /// output that is tied to it, which has no `max_duration`.
     load_at: Option<Clock32>,
+    is_tied: bool,
     queue: Queue,
     last_queued: Clock32,
 }
@@ -56,6 +60,7 @@ impl DigitalOut {
             off_ticks: 0,
             toggle_at: None,
             load_at: None,
+            is_tied: false,
             queue: Queue::new(),
             last_queued: Clock32(0),
         })
@@ -70,9 +75,33 @@ impl DigitalOut {
         Ok(())
     }
 
+    /// Ties the queued changes to the motion clock. An output that has to be refreshed cannot be: a hold would end it.
+    pub(crate) const fn tie(&mut self) -> Result<(), ShutdownReason> {
+        if self.max_duration != 0 {
+            return Err(ShutdownReason::InvalidMotion);
+        }
+        self.is_tied = true;
+        Ok(())
+    }
+
+    pub(crate) const fn is_tied(&self) -> bool {
+        self.is_tied
+    }
+
+    /// Drops what is queued; the output stays as it is.
+    pub(crate) fn drop_queue<const M: usize>(&mut self, moves: &mut MovePool<M>) {
+        moves.clear(&mut self.queue);
+        self.load_at = None;
+    }
+
+    /// When the next change is due on the hardware clock, if that is within reach.
+    fn load_due(&self, motion: &MotionClock) -> Option<Clock32> {
+        self.load_at.and_then(|at| if self.is_tied { motion.when(at) } else { Some(at) })
+    }
+
     /// When the timer is to wake.
-    pub(crate) fn wake(&self) -> Option<Clock32> {
-        match (self.toggle_at, self.load_at) {
+    pub(crate) fn wake(&self, motion: &MotionClock) -> Option<Clock32> {
+        match (self.toggle_at, self.load_due(motion)) {
             (Some(toggle), Some(load)) => Some(if toggle.is_before(load) { toggle } else { load }),
             (toggle, load) => toggle.or(load),
         }
@@ -83,9 +112,11 @@ impl DigitalOut {
         &mut self,
         now: Clock32,
         moves: &mut MovePool<M>,
+        motion: &MotionClock,
         change: OutputMove,
     ) -> Result<(), ShutdownReason> {
         let clock = Clock32(change.clock);
+        let now = if self.is_tied { motion.motion(now) } else { now };
         if clock.is_before(now) || (!self.queue.is_empty() && clock.is_before(self.last_queued)) {
             return Err(ShutdownReason::TimerTooClose);
         }
@@ -117,15 +148,16 @@ impl DigitalOut {
         &mut self,
         board: &mut impl Board,
         moves: &mut MovePool<M>,
+        motion: &MotionClock,
         wake: Clock32,
     ) -> Result<After, ShutdownReason> {
-        if self.load_at == Some(wake) {
+        if self.load_due(motion) == Some(wake) {
             self.load(board, moves, wake)?;
         } else if self.toggle_at == Some(wake) {
             self.set(board, !self.level);
             self.toggle_at = Some(wake.wrapping_add(if self.level { self.on_ticks } else { self.off_ticks }));
         }
-        Ok(self.wake().map_or(After::Done, After::Again))
+        Ok(self.wake(motion).map_or(After::Done, After::Again))
     }
 
     fn load<const M: usize>(

@@ -24,6 +24,9 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         board: &mut impl Board,
         command: Command<'_>,
     ) -> Result<(), ShutdownReason> {
+        if command.kind().is_extension() {
+            return self.dispatch_motion(board, &command);
+        }
         match command {
             Command::Identify { .. }
             | Command::GetConfig {}
@@ -164,7 +167,8 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         match command {
             Command::QueueStep { oid, interval, count, add } => {
                 let stepper = self.objects.stepper(oid)?;
-                if let Some(wake) = stepper.queue_step(board, &mut self.moves, (interval, count, add))? {
+                let row = (interval, count, add);
+                if let Some(wake) = stepper.queue_step(board, &mut self.moves, &self.hold.clock, row)? {
                     self.timers.schedule(oid, wake);
                 }
             }
@@ -224,15 +228,16 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             Command::QueryAnalogIn { .. } => self.sample(board, command),
             Command::QueueDigitalOut { oid, clock, on_ticks } => {
                 let output = self.objects.digital_out(oid)?;
-                output.queue(board.now(), &mut self.moves, OutputMove { clock, on_ticks })?;
-                let wake = output.wake();
+                let change = OutputMove { clock, on_ticks };
+                output.queue(board.now(), &mut self.moves, &self.hold.clock, change)?;
+                let wake = output.wake(&self.hold.clock);
                 self.reset_output_timer(oid, wake);
                 Ok(())
             }
             Command::UpdateDigitalOut { oid, value } => {
                 let output = self.objects.digital_out(oid)?;
                 output.update(board, &mut self.moves, value != 0);
-                let wake = output.wake();
+                let wake = output.wake(&self.hold.clock);
                 self.reset_output_timer(oid, wake);
                 Ok(())
             }

@@ -8,6 +8,7 @@ use wire::{
 
 use crate::{
     board::Board,
+    hold::Hold,
     moves::MovePool,
     objects::{After, Object, Objects},
     receiver::Receiver,
@@ -47,12 +48,19 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
         self
     }
 
+    /// As a board with plain Klipper firmware: the motion clock is the hardware clock, and its commands do not exist.
+    #[must_use]
+    pub const fn without_motion_clock(mut self) -> Self {
+        self.core.has_motion_clock = false;
+        self
+    }
+
     /// Takes bytes from the host, in pieces of any size: answers and obeys.
     pub fn receive(&mut self, board: &mut impl Board, bytes: &[u8]) {
         let Self { deframer, core } = self;
         let now = board.now();
-        core.uptime.look(now);
         core.timers.look(now);
+        core.look(now);
         deframer.push(bytes, |frame| core.frame(board, frame));
     }
 
@@ -86,18 +94,23 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
 /// All but the deframer, whose buffer holds the block that is being obeyed.
 pub(crate) struct Core<const OBJECTS: usize, const MOVES: usize> {
     pub(crate) objects: Objects<OBJECTS>,
-    /// Timers on the hardware clock. A motion clock of its own would be a second list, for steppers and the outputs
-    /// that follow them.
+    /// All timers, on the hardware clock. Those that wait on the motion clock are set to what that means, anew each
+    /// time its rate changes; where it is out of reach they do not run.
     pub(crate) timers: Timers<OBJECTS>,
     pub(crate) moves: MovePool<MOVES>,
     pub(crate) receiver: Receiver,
     pub(crate) halt: Halt,
+    pub(crate) hold: Hold,
+    pub(crate) has_motion_clock: bool,
+    /// The host's mark of the job whose rows are counted.
+    pub(crate) job: u32,
     /// The host's mark of the configuration, once that is complete.
     pub(crate) config_crc: Option<u32>,
     pub(crate) uptime: Uptime,
     stats: Stats,
     /// When the clock has to be looked at again.
     look_at: Clock32,
+    clock: Hertz,
     late_ticks: u32,
     starting: bool,
     pub(crate) reports_pending: bool,
@@ -111,10 +124,14 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             moves: MovePool::new(),
             receiver: Receiver::new(),
             halt: Halt::new(),
+            hold: Hold::new(clock),
+            has_motion_clock: true,
+            job: 0,
             config_crc: None,
             uptime: Uptime::new(),
             stats: Stats::new(clock),
             look_at: Clock32(0),
+            clock,
             late_ticks: clock.0 / LATE_SECONDS_INVERSE,
             starting: true,
             reports_pending: false,
@@ -165,6 +182,10 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             if now.is_before(wake) {
                 now = board.now();
                 if now.is_before(wake) {
+                    if !now.is_before(self.look_at) {
+                        self.look(now);
+                        continue;
+                    }
                     return if self.look_at.is_before(wake) { self.next_look(now) } else { wake };
                 }
                 if now.since(begin) as u32 > self.late_ticks / BUSY_PART {
@@ -176,7 +197,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
                 break;
             }
             if let Some(Object::Stepper(stepper)) = self.objects.get_mut(oid) {
-                match stepper.event(board, &mut self.moves, self.late_ticks) {
+                match stepper.event(board, &mut self.moves, &self.hold.clock, self.late_ticks) {
                     Ok(Some(next)) => self.timers.reschedule_first(next),
                     Ok(None) => self.timers.cancel(oid),
                     Err(reason) => self.shut_down(board, reason),
@@ -193,19 +214,46 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         if now.is_before(self.look_at) { self.look_at } else { now.wrapping_add(1) }
     }
 
-    /// Looks at the clock, which is due every few seconds.
+    /// Looks at the clock, which is due every few seconds and at every change of the motion clock.
     #[cold]
     #[inline(never)]
-    fn look(&mut self, now: Clock32) {
+    pub(crate) fn look(&mut self, now: Clock32) {
         self.uptime.look(now);
         self.look_at = self.stats.look(now);
+        self.hold.advance(now);
+        self.reports_pending |= self.hold.report_pending;
+        if let Some(at) = self.hold.event_at().filter(|at| at.is_before(self.look_at)) {
+            self.look_at = at;
+        }
+        if self.hold.take_retime() {
+            self.retime();
+        }
+    }
+
+    /// Sets the timers that wait on the motion clock, whose rate has changed.
+    fn retime(&mut self) {
+        let Self { objects, timers, hold, .. } = self;
+        for (oid, object) in objects.iter_mut() {
+            let wake = match object {
+                Object::Stepper(stepper) => match stepper.motion_wake() {
+                    Some(wake) => hold.clock.when(wake),
+                    None => continue,
+                },
+                Object::DigitalOut(output) if output.is_tied() => output.wake(&hold.clock),
+                _ => continue,
+            };
+            match wake {
+                Some(wake) => timers.schedule(oid, wake),
+                None => timers.cancel(oid),
+            }
+        }
     }
 
     /// The timers of everything but steppers.
     #[inline(never)]
     fn run_timer(&mut self, board: &mut impl Board, oid: u8, wake: Clock32) {
         let after = match self.objects.get_mut(oid) {
-            Some(Object::DigitalOut(output)) => output.event(board, &mut self.moves, wake),
+            Some(Object::DigitalOut(output)) => output.event(board, &mut self.moves, &self.hold.clock, wake),
             Some(Object::Endstop(endstop)) => Ok(endstop.event(board, wake)),
             Some(Object::AnalogIn(input)) => {
                 let after = input.event(board, wake);
@@ -285,6 +333,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         self.stop_everything(board);
         self.objects.clear();
         self.config_crc = None;
+        self.job = 0;
         self.halt.leave();
     }
 
@@ -292,6 +341,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         self.timers.clear();
         self.objects.shut_down(board);
         self.moves.reset();
+        self.hold = Hold::new(self.clock);
         self.reports_pending = false;
     }
 
@@ -328,6 +378,10 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         if self.reports_pending {
             self.reports_pending = false;
             self.report(board);
+        }
+        if self.hold.report_pending {
+            self.hold.report_pending = false;
+            self.report_motion(board);
         }
         if self.stats.pending {
             let stats = self.stats.take();

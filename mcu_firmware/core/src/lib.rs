@@ -9,6 +9,7 @@
 //! | `board` | what is asked of a chip |
 //! | `firmware`, `dispatch` | the whole; what each command does |
 //! | `receiver` | sequence numbers and acknowledgements |
+//! | `motion_clock`, `hold`, `motion_commands` | the clock that steps are due on; when it slows down and stops |
 //! | `scheduler`, `moves` | timers; the pool of queued moves |
 //! | `objects` | what was configured, by oid |
 //! | `stepper`, `endstop`, `trsync`, `analog_in`, `digital_out` | the kinds of objects |
@@ -23,6 +24,9 @@ mod digital_out;
 mod dispatch;
 mod endstop;
 mod firmware;
+mod hold;
+mod motion_clock;
+mod motion_commands;
 mod moves;
 mod objects;
 mod receiver;

@@ -355,7 +355,8 @@ impl<R: Recorder> VirtualPrinter<R> {
 }
 
 fn new_firmware(profile: &BoardProfile) -> Box<Firmware<OBJECTS_MAX, MOVES_MAX>> {
-    Box::new(Firmware::new(profile.clock).with_move_count(profile.move_count))
+    let firmware = Firmware::new(profile.clock).with_move_count(profile.move_count);
+    Box::new(if profile.motion_clock { firmware } else { firmware.without_motion_clock() })
 }
 
 fn motor_view(axis: &Axis) -> MotorView {

@@ -117,6 +117,10 @@ fn cases() -> Vec<(ShutdownReason, Vec<Command<'static>>)> {
         (R::InvalidPwm, vec![Command::SetDigitalOutPwmCycle { oid: HEATER, cycle_ticks: 1 << 31 }]),
         (R::InvalidAdcTiming, vec![sample(soon, 100, 7000)]),
         (R::InvalidEndstop, vec![home(soon, 0, TRSYNC)]),
+        (R::InvalidMotion, vec![Command::MotionHold { ramp: (1 << 30) + 1 }]),
+        (R::InvalidMotion, vec![Command::MotionRate { rate: 0, ramp: 0 }]),
+        (R::InvalidMotion, vec![Command::MotionRate { rate: 4097, ramp: 0 }]),
+        (R::MotionNotHeld, vec![Command::MotionDrop {}]),
     ]
 }
 

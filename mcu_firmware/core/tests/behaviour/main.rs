@@ -2,6 +2,7 @@
 
 mod bench;
 mod faults;
+mod hold;
 mod homing;
 mod inputs;
 mod link;
