@@ -118,6 +118,13 @@ impl Bench {
         Self { firmware: Box::new(Firmware::new(CLOCK)), board, sequence: 0 }
     }
 
+    /// The same with plain Klipper firmware.
+    pub(crate) fn plain(now: u64) -> Self {
+        let mut bench = Self::at(now);
+        *bench.firmware = Firmware::new(CLOCK).without_motion_clock();
+        bench
+    }
+
     /// A board whose host has configured `commands`.
     pub(crate) fn configured(now: u64, commands: &[Command<'_>]) -> Self {
         let mut bench = Self::at(now);
