@@ -67,6 +67,9 @@ fn message(response: &Response<'_>) -> Option<Message> {
             Message::Shutdown { reason: static_string_id }
         }
         Response::Starting {} => Message::Starting,
-        Response::Stats { .. } | Response::IdentifyResponse { .. } => return None,
+        Response::Stats { .. }
+        | Response::IdentifyResponse { .. }
+        | Response::MotionState { .. }
+        | Response::StepperQueue { .. } => return None,
     })
 }
