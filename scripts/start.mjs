@@ -1,6 +1,7 @@
 #!/usr/bin/env node
 // `npm start`: sets up what a fresh machine lacks, builds the planner and the page, and serves the page on this
-// computer.
+// computer. The instruments (graphs) take minutes to build and the page works without them: they are built once the
+// page is served, and appear in it when they are there.
 //
 //   npm start                    on http://127.0.0.1:8372/, or the next free port
 //   npm start -- --port 9000     on another port
@@ -11,6 +12,7 @@ import { existsSync } from 'node:fs';
 import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 
+import { inBackground } from './lib/background.mjs';
 import { fileServer, listen } from './lib/server.mjs';
 import { setUp, shown } from './lib/setup.mjs';
 import { root } from './lib/target.mjs';
@@ -31,6 +33,21 @@ function build() {
   return setUp() && shown('cargo', ['xtask', 'wasm']) && shown('npm', ['run', '--workspace=web', 'build']);
 }
 
+const secondsSince = (began) => ((performance.now() - began) / 1000).toFixed(1);
+
+/** Builds the instruments beside the running server, which a failure does not end. Returns what ends the building. */
+function buildInstruments() {
+  const began = performance.now();
+  const building = inBackground(['cargo', 'xtask', 'instruments'], { cwd: root });
+  building.done.then(({ outcome, output }) => {
+    if (outcome === 'done') console.log(`The instruments are built (${secondsSince(began)} s).`);
+    if (outcome === 'failed') {
+      console.error(`${output}\nThe instruments could not be built; the rest of the page works without them.`);
+    }
+  });
+  return building.end;
+}
+
 async function main() {
   const { port, build: wanted } = readArguments();
   const began = performance.now();
@@ -41,10 +58,11 @@ async function main() {
   }
   const server = fileServer(PAGE);
   const address = await listen(server, { port });
-  const seconds = ((performance.now() - began) / 1000).toFixed(1);
-  console.log(`\nStepcast is at ${address} (first page after ${seconds} s). Ctrl+C ends it.`);
-  for (const signal of ['SIGINT', 'SIGTERM']) {
+  console.log(`\nStepcast is at ${address} (first page after ${secondsSince(began)} s). Ctrl+C ends it.`);
+  const endBuilding = wanted ? buildInstruments() : () => {};
+  for (const signal of ['SIGINT', 'SIGTERM', 'SIGHUP']) {
     process.once(signal, () => {
+      endBuilding();
       server.close();
       server.closeAllConnections();
     });

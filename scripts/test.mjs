@@ -9,6 +9,7 @@
 // Plain Node, built-ins only: it has to run before anything is installed.
 import { join } from 'node:path';
 
+import { BROWSER_ADVICE, obtainBrowser } from './lib/browser.mjs';
 import { setUp } from './lib/setup.mjs';
 import { runSteps } from './lib/steps.mjs';
 import { root } from './lib/target.mjs';
@@ -24,8 +25,18 @@ const nodeTests = (...files) => [
 /** A program of an npm package. */
 const packaged = (name, ...args) => [process.execPath, join('node_modules', ...name.split('/')), ...args];
 
+/** Why the browser tests cannot run. Continuous integration has no excuse: there the step runs, and fails. */
+function browserAbsent() {
+  try {
+    return obtainBrowser() || process.env.CI ? undefined : BROWSER_ADVICE;
+  } catch {
+    // CHROME_PATH names no browser: the step says so, and fails.
+    return undefined;
+  }
+}
+
 const steps = [
-  { name: 'scripts', commands: [nodeTests('steps.test.mjs', 'toolchain.test.mjs', 'server.test.mjs')] },
+  { name: 'scripts', commands: [nodeTests('steps.test.mjs', 'toolchain.test.mjs', 'server.test.mjs', 'start.test.mjs', 'browser.test.mjs')] },
   { name: 'format', commands: [['cargo', 'fmt', '--all', '--check']] },
   { name: 'layers', commands: [['cargo', 'xtask', 'layers']] },
   {
@@ -57,7 +68,7 @@ const steps = [
   {
     name: 'TypeScript',
     needs: ['WebAssembly equals native'],
-    commands: ['web/tsconfig.json', 'web/tsconfig.node.json', 'viz/toolpath/tsconfig.json'].map((file) =>
+    commands: ['web/tsconfig.json', 'web/tsconfig.node.json', 'viz/toolpath/tsconfig.json', 'e2e/tsconfig.json'].map((file) =>
       packaged('typescript/bin/tsc', '--noEmit', '--project', file),
     ),
   },
@@ -65,10 +76,18 @@ const steps = [
     name: 'TypeScript tests',
     commands: ['web', 'viz/toolpath'].map((folder) => packaged('vitest/vitest.mjs', 'run', '--root', folder)),
   },
+  // Before the page, which takes them along.
+  { name: 'instruments build', commands: [['cargo', 'xtask', 'instruments']] },
   {
     name: 'page build',
     needs: ['WebAssembly equals native'],
     commands: [packaged('vite/bin/vite.js', 'build', 'web')],
+  },
+  {
+    name: 'browser tests',
+    needs: ['page build', 'instruments build', 'release build'],
+    absent: browserAbsent,
+    commands: [packaged('@playwright/test/cli.js', 'test', '--config', join('e2e', 'playwright.config.ts'))],
   },
   {
     name: 'instructions a step',

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use printer::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
-    session::{Event, JobOptions, PhaseName, Request, ScheduledMove, Session},
+    session::{Event, JobOptions, JobStatus, PhaseName, ScheduledMove, Session},
 };
 use units::{Seconds, Ticks};
 use wasm_bindgen::prelude::{JsError, wasm_bindgen};
@@ -18,7 +18,9 @@ use crate::{
         BoardView, ErrorMessage, JobRequest, JobView, LinkView, Snapshot, TemperatureView, UiEvent,
         UiRequest, json,
     },
-    read_config, simulation, thrown,
+    read_config, simulation,
+    speed::SpeedRecord,
+    thrown,
 };
 
 /// The most events that wait.
@@ -28,9 +30,6 @@ const MOVES_MAX: usize = 16_384;
 /// Numbers that describe a move: line, start and end (host time, s), from x y z e, to x y z e (mm).
 pub const MOVE_NUMBERS: usize = 11;
 
-/// Moves that overlap by no more follow each other: rounding.
-const TICKS_SLACK: Ticks = Ticks(1000);
-
 /// A session with a memory.
 pub struct Host {
     session: Session,
@@ -39,13 +38,13 @@ pub struct Host {
     moves: VecDeque<ScheduledMove>,
     /// Moves that have not ended.
     ahead: VecDeque<ScheduledMove>,
+    speeds: SpeedRecord,
     board: Option<BoardView>,
     temperatures: Vec<TemperatureView>,
     line: u32,
     elapsed_s: f64,
     fed_bytes: u64,
-    speed_factor: f64,
-    flow_factor: f64,
+    queued_least: Option<Seconds>,
 }
 
 impl Host {
@@ -57,13 +56,13 @@ impl Host {
             dropped: 0,
             moves: VecDeque::new(),
             ahead: VecDeque::new(),
+            speeds: SpeedRecord::default(),
             board: None,
             temperatures: Vec::new(),
             line: 0,
             elapsed_s: 0.0,
             fed_bytes: 0,
-            speed_factor: 1.0,
-            flow_factor: 1.0,
+            queued_least: None,
         }
     }
 
@@ -75,24 +74,24 @@ impl Host {
 
     /// Does what is due; bytes for the port go to `out`. Returns when to call again if nothing arrives before.
     pub fn poll(&mut self, now: Seconds, out: &mut Vec<u8>) -> Seconds {
+        self.note_queued(now);
         let wake = self.session.poll(now, out);
         self.sort_events();
         wake
     }
 
+    /// Before the session adds to it: the board's queue is shortest now.
+    fn note_queued(&mut self, now: Seconds) {
+        if self.session.job_status() == JobStatus::Printing
+            && let Some(queued) = self.session.motion_queued(now)
+        {
+            self.queued_least = Some(self.queued_least.map_or(queued, |least| least.min(queued)));
+        }
+    }
+
     /// Asks for something.
     pub fn request(&mut self, request: UiRequest, now: Seconds) -> Result<(), PrinterError> {
-        let request = Request::from(request);
-        let (speed, flow) = match request {
-            Request::SetSpeedFactor(factor) => (Some(factor), None),
-            Request::SetFlowFactor(factor) => (None, Some(factor)),
-            _ => (None, None),
-        };
-        let result = self.session.request(request, now);
-        if result.is_ok() {
-            self.speed_factor = speed.unwrap_or(self.speed_factor);
-            self.flow_factor = flow.unwrap_or(self.flow_factor);
-        }
+        let result = self.session.request(request.into(), now);
         self.sort_events();
         result
     }
@@ -103,9 +102,7 @@ impl Host {
         self.line = 0;
         self.elapsed_s = 0.0;
         self.fed_bytes = 0;
-        // A job's modal state is its own.
-        self.speed_factor = 1.0;
-        self.flow_factor = 1.0;
+        self.queued_least = None;
         self.sort_events();
         Ok(())
     }
@@ -144,6 +141,7 @@ impl Host {
             Event::Phase(phase) if *phase != PhaseName::Ready => {
                 self.moves.clear();
                 self.ahead.clear();
+                self.speeds.clear();
                 if *phase == PhaseName::Identifying {
                     self.board = None;
                     self.temperatures.clear();
@@ -159,15 +157,13 @@ impl Host {
             }
             Event::Move(mv) => {
                 push_bounded(&mut self.moves, *mv);
-                // A homing move that the next one overlaps was cut short by its endstop.
-                while self
-                    .ahead
-                    .pop_back_if(|last| last.homing && last.end > mv.start + TICKS_SLACK)
-                    .is_some()
-                {}
                 push_bounded(&mut self.ahead, *mv);
+                self.speeds.push(mv);
             }
-            Event::Homed { .. } => self.ahead.retain(|mv| !mv.homing),
+            Event::RunBroken { at } => {
+                self.ahead.clear();
+                self.speeds.stop(*at);
+            }
             Event::Temperature { .. } => {
                 if let Some(UiEvent::Temperature { heater, temperature_c, target_c, duty }) =
                     UiEvent::of(event)
@@ -221,9 +217,17 @@ impl Host {
         Some([0, 1, 2, 3].map(|axis| mv.from[axis] + part * (mv.to[axis] - mv.from[axis])))
     }
 
+    /// The toolhead's planned speed around now, pairs of time (s, relative to now) and speed (mm/s); nothing while the
+    /// board's clock is not known.
+    pub fn planned_speed(&self, now: Seconds, behind: Seconds, ahead: Seconds) -> Vec<f64> {
+        let clock = self.clock(now);
+        clock.map_or_else(Vec::new, |(now, freq)| self.speeds.around(now, freq, behind, ahead))
+    }
+
     /// Everything that a panel shows.
     pub fn snapshot(&mut self, now: Seconds) -> Snapshot {
         let position = self.session.position();
+        let [speed_factor, flow_factor] = self.session.factors();
         Snapshot {
             phase: self.session.phase().into(),
             error: self.session.error().map(ErrorMessage::from),
@@ -237,10 +241,11 @@ impl Host {
                 line: self.line,
                 elapsed_s: self.elapsed_s,
                 fed_bytes: self.fed_bytes as f64,
+                queued_least_s: self.queued_least.map(|time| time.0),
             },
             queued_s: self.session.motion_queued(now).map(|time| time.0),
-            speed_factor: self.speed_factor,
-            flow_factor: self.flow_factor,
+            speed_factor,
+            flow_factor,
             fan: self.session.fan_speed(),
             link: self.session.link_stats().map(LinkView::from),
         }
@@ -315,6 +320,13 @@ impl PrinterSession {
         self.host.take_moves(Seconds(now_s))
     }
 
+    /// The toolhead's planned speed from `behind_s` before now to `ahead_s` after it: pairs of time (s, relative to now,
+    /// ascending) and speed (mm/s), between which it changes evenly. At most 4096 pairs, peaks kept; rest is zero, and
+    /// the curve ends early where the plan does while the head still moves. Empty while the board is not ready.
+    pub fn planned_speed(&self, now_s: f64, behind_s: f64, ahead_s: f64) -> Vec<f64> {
+        self.host.planned_speed(Seconds(now_s), Seconds(behind_s), Seconds(ahead_s))
+    }
+
     /// Asks for something: a `UiRequest` as JSON. What it leads to comes as events; an error means that nothing was done.
     pub fn request(&mut self, request: &str, now_s: f64) -> Result<(), JsError> {
         let request = serde_json::from_str(request).map_err(|error| unreadable(&error))?;
@@ -353,96 +365,4 @@ fn unreadable(error: &serde_json::Error) -> JsError {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{Simulation, messages::PhaseLabel};
-    use printer::config::parse;
-
-    fn machine() -> PrinterConfig {
-        parse(demo_machine::USUAL_MACHINE).0.unwrap()
-    }
-
-    /// Lets a host and a printer run until a time, or until an event is seen.
-    fn run(host: &mut Host, printer: &mut Simulation, until: f64, seen: impl Fn(&UiEvent) -> bool) -> bool {
-        let (mut to_board, mut to_host) = (Vec::new(), Vec::new());
-        while printer.now().0 < until {
-            let now = printer.now();
-            let wake = host.poll(now, &mut to_board);
-            printer.write(&to_board);
-            to_board.clear();
-            if host.take_events().iter().any(&seen) {
-                return true;
-            }
-            printer.run_until(wake.max(now + Seconds(50e-6)).min(Seconds(until)), &mut to_host);
-            host.receive(&to_host, printer.now());
-            to_host.clear();
-        }
-        false
-    }
-
-    #[test]
-    fn a_snapshot_follows_the_machine() {
-        let mut printer = Simulation::new(machine(), None, 1, "").unwrap();
-        let mut host = Host::new(machine(), printer.now());
-        let before = host.snapshot(printer.now());
-        assert_eq!((before.phase, before.board, before.live_mm), (PhaseLabel::Identifying, None, None));
-        let ready = |event: &UiEvent| *event == UiEvent::Phase { phase: PhaseLabel::Ready };
-        assert!(run(&mut host, &mut printer, 20.0, ready));
-        host.request(UiRequest::Home { axes: Vec::new() }, printer.now()).unwrap();
-        assert!(run(&mut host, &mut printer, 120.0, |event| matches!(event, UiEvent::Homed { axis: 2, .. })));
-        let settled = printer.now().0 + 3.0;
-        run(&mut host, &mut printer, settled, |_| false);
-        host.take_moves(printer.now());
-
-        let text = "G90\nG1 X100 Y50 F600".to_owned();
-        host.request(UiRequest::Gcode { text }, printer.now()).unwrap();
-        host.request(UiRequest::SetFan { speed: 0.5 }, printer.now()).unwrap();
-        host.request(UiRequest::SetSpeedFactor { factor: 0.8 }, printer.now()).unwrap();
-        let halfway = printer.now().0 + 5.0;
-        run(&mut host, &mut printer, halfway, |_| false);
-        let now = printer.now();
-        let snapshot = host.snapshot(now);
-        let (live, end) = (snapshot.live_mm.unwrap(), snapshot.position_mm.unwrap());
-        assert!((end[0] - 100.0).abs() < 1e-9 && (end[1] - 50.0).abs() < 1e-9);
-        assert!(live[0] > 10.0 && live[0] < 90.0, "{live:?}");
-        assert!((live[0] - 2.0 * live[1]).abs() < 1e-6, "{live:?}");
-        let truly = printer.state();
-        assert!((truly.motors[0].position_mm - live[0]).abs() < 1.0, "{live:?} {truly:?}");
-        assert_eq!((snapshot.homed, snapshot.speed_factor), ([true; 3], 0.8));
-        assert!((snapshot.fan - 0.5).abs() < 0.01);
-        assert!(snapshot.link.unwrap().received_bytes > 1000);
-        assert_eq!(snapshot.temperatures.len(), 2);
-
-        let moves = host.take_moves(now);
-        assert_eq!(moves.len(), MOVE_NUMBERS);
-        let (start, stop) = (moves[1], moves[2]);
-        assert!(start < now.0 && now.0 < stop && stop - start > 11.0, "{moves:?}");
-        assert_eq!(moves[7..9], [100.0, 50.0]);
-        assert_eq!(host.take_moves(now), Vec::<f64>::new());
-
-        host.request(UiRequest::EmergencyStop, now).unwrap();
-        let stopped = host.snapshot(now);
-        assert_eq!((stopped.phase, stopped.live_mm), (PhaseLabel::Shutdown, None));
-        assert!(stopped.error.is_some());
-    }
-
-    #[test]
-    fn what_nobody_takes_is_bounded_and_counted() {
-        let mut host = Host::new(machine(), Seconds(0.0));
-        assert_eq!(host.events.len(), 0);
-        host.events.extend((0..EVENTS_MAX + 9).map(|_| UiEvent::Paused));
-        host.sort_events();
-        let events = host.take_events();
-        assert_eq!(events.len(), EVENTS_MAX + 1);
-        // The session's own first event is among those that stay.
-        assert_eq!(events.last(), Some(&UiEvent::Dropped { count: 10 }));
-        assert_eq!(host.take_events(), []);
-        for _ in 0..MOVES_MAX + 9 {
-            let still = [0.0; 4];
-            let (start, end) = (Ticks(0), Ticks(1));
-            let mv = ScheduledMove { line: 1, start, end, from: still, to: still, homing: false };
-            host.remember(&Event::Move(mv));
-        }
-        assert_eq!((host.moves.len(), host.ahead.len()), (MOVES_MAX, MOVES_MAX));
-    }
-}
+mod tests;

@@ -12,6 +12,7 @@ pub mod messages;
 mod plan;
 mod preview;
 mod simulation;
+mod speed;
 mod virtual_printer;
 
 use printer::{
@@ -22,6 +23,7 @@ use wasm_bindgen::prelude::{JsError, wasm_bindgen};
 
 pub use host::{Host, MOVE_NUMBERS};
 pub use simulation::Simulation;
+pub use speed::SPEED_PAIRS_MAX;
 
 use messages::{ConfigReport, ErrorMessage, FileKindReport, json};
 

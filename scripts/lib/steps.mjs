@@ -10,12 +10,13 @@ export const NOT_RUN = 'not run';
 const bold = (text) => (process.stdout.isTTY ? `\x1b[1m${text}\x1b[0m` : text);
 const seconds = (ms) => `${(ms / 1000).toFixed(1)} s`;
 
-// What Rust's, Node's and vitest's test runners write when they are done.
+// What Rust's, Node's, vitest's and Playwright's test runners write when they are done.
 const RUST_RESULT = /^test result: \w+\. (\d+) passed; (\d+) failed; (\d+) ignored/gm;
 const NODE_RESULT = /^ℹ (pass|fail|skipped) (\d+)/gm;
 const VITEST_RESULT = /^\s+Tests\s.*\(\d+\)$/gm;
+const PLAYWRIGHT_RESULT = /^ {2}(\d+) (passed|failed|skipped)(?: \([\d.]+\w+\))?$/gm;
 
-/** How many tests the output of `cargo test`, `node --test` or `vitest run` tells of. */
+/** How many tests the output of `cargo test`, `node --test`, `vitest run` or `playwright test` tells of. */
 export function countTests(output) {
   const plain = output.replace(/\x1b\[[0-9;]*m/g, '');
   const counts = { passed: 0, failed: 0, skipped: 0 };
@@ -29,6 +30,7 @@ export function countTests(output) {
   for (const [line] of plain.matchAll(VITEST_RESULT)) {
     for (const [, number, what] of line.matchAll(/(\d+) (passed|failed|skipped)/g)) counts[what] += Number(number);
   }
+  for (const [, number, what] of plain.matchAll(PLAYWRIGHT_RESULT)) counts[what] += Number(number);
   return counts;
 }
 

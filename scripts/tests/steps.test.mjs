@@ -14,8 +14,12 @@ test('tests are counted from what the runners write, colours or not', () => {
     'ℹ skipped 1',
     '\x1b[2m      Tests \x1b[22m \x1b[31m4 failed\x1b[39m | \x1b[32m56 passed\x1b[39m (60)',
     '      Tests  7 passed (7)',
+    '  1 failed',
+    '    specs/print.spec.ts:13:1 › 2 passed',
+    '  1 skipped',
+    '  18 passed (7.2m)',
   ].join('\n');
-  assert.deepEqual(countTests(output), { passed: 82, failed: 6, skipped: 2 });
+  assert.deepEqual(countTests(output), { passed: 100, failed: 7, skipped: 3 });
 });
 
 /** Runs steps in a Node of their own and gives its exit status and its output. */

@@ -50,7 +50,6 @@ class Pair {
     this.session = wasm.PrinterSession.for_virtual_printer(config, board, this.printer.now_s());
     this.events = [];
     this.gcode = undefined;
-    this.leastQueued = Infinity;
     this.moves = 0;
   }
 
@@ -144,7 +143,14 @@ for (const board of ['rp2040', 'stm32f103']) {
     const before = pair.state();
     assert.ok(before.motors.every((motor) => motor.lost_steps === 0));
     pair.print(tiny);
-    pair.runUntil(() => pair.saw('job-done') || pair.saw('error'));
+    let fastest = 0;
+    pair.runUntil(() => {
+      const speeds = pair.session.planned_speed(pair.printer.now_s(), 1, 5);
+      for (let at = 1; at < speeds.length; at += 2) fastest = Math.max(fastest, speeds[at]);
+      return pair.saw('job-done') || pair.saw('error');
+    });
+    // The travel at F9000.
+    assert.ok(fastest > 100 && fastest < 150.001, `${fastest} mm/s`);
     const rest = pair.printer.now_s() + 2;
     pair.runUntil(() => pair.printer.now_s() > rest);
     assert.deepEqual(pair.events.filter((event) => event.type === 'error'), []);

@@ -1,9 +1,11 @@
 // A session that does what a test tells it, for the loops around it.
-import type { Snapshot, Trouble, Wish } from '../src/machine/protocol';
-import type { Session, SimulatedPrinter } from '../src/machine/session';
+
+import type { VirtualState } from '../src/bindings/VirtualState';
+import type { Trouble, Wish } from '../src/machine/protocol';
+import type { Session, SessionSnapshot, SimulatedPrinter } from '../src/machine/session';
 import { celsius, type Seconds, seconds, share } from '../src/units';
 
-const SNAPSHOT: Snapshot = {
+const SNAPSHOT: SessionSnapshot = {
   phase: 'ready',
   heaters: [{ name: 'extruder', temperature: celsius(20), target: celsius(0), duty: share(0) }],
   position: null,
@@ -12,6 +14,7 @@ const SNAPSHOT: Snapshot = {
   line: 0,
   elapsed: seconds(0),
   queued: null,
+  queuedLeast: null,
   speedFactor: share(1),
   flowFactor: share(1),
   fan: share(0),
@@ -63,8 +66,12 @@ export class FakeSession implements Session {
   jobEnd(): void {
     this.ended = true;
   }
-  snapshot(): Snapshot {
+  snapshot(): SessionSnapshot {
     return SNAPSHOT;
+  }
+  /** A line through the stretch that was asked for: its speed is the time. */
+  plannedSpeed(now: Seconds, behind: Seconds, ahead: Seconds): Float64Array<ArrayBuffer> {
+    return Float64Array.of(-behind, now - behind, ahead, now + ahead);
   }
   free(): void {
     this.polls.length = 0;
@@ -95,6 +102,17 @@ export class EchoPrinter implements SimulatedPrinter {
     }
     this.#now = Math.max(this.#now, until);
     return new Uint8Array();
+  }
+  record(): VirtualState {
+    return {
+      time_s: this.#now,
+      connected: true,
+      motors: [],
+      heaters: [],
+      fans: [],
+      endstops: [],
+      shutdown: null,
+    };
   }
   free(): void {
     this.freed = true;

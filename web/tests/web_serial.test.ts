@@ -1,5 +1,5 @@
 // A serial port as a transport: errors on the line are survived, an unplugged device is told once.
-import { expect, test } from 'vitest';
+import { expect, test, vi } from 'vitest';
 import { find, identify, openSerial } from '../src/transport/web_serial';
 
 type Step = number[] | DOMException | 'unplug';
@@ -104,6 +104,28 @@ test('writes reach the port', async () => {
   const transport = await openSerial(asPort(port), 250_000);
   await transport.writable.getWriter().write(Uint8Array.of(9, 8));
   expect(port.written).toEqual([9, 8]);
+});
+
+test('a device that takes nothing any more does not keep the port from being closed', async () => {
+  vi.useFakeTimers();
+  const port = new ScriptedPort([]);
+  const transport = await openSerial(asPort(port), 250_000);
+  let aborted = false;
+  const never = (): Promise<void> => new Promise(() => undefined);
+  port.writable = new WritableStream({
+    close: never,
+    start: (controller) => {
+      controller.signal.addEventListener('abort', () => {
+        aborted = true;
+      });
+    },
+  });
+  await transport.writable.getWriter().write(Uint8Array.of(1));
+  const closing = transport.close();
+  await vi.advanceTimersByTimeAsync(2000);
+  await closing;
+  expect([aborted, port.closed]).toEqual([true, true]);
+  vi.useRealTimers();
 });
 
 test('a port that cannot be opened says whether it is there', async () => {

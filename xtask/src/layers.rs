@@ -96,6 +96,7 @@ const LAYERS: &[Layer] = &[
         tests_may_use: &[],
         pure: false,
     },
+    Layer { name: "instruments", folder: "viz/instruments", may_use: &[], tests_may_use: &[], pure: true },
     Layer { name: "xtask", folder: "xtask", may_use: &[], tests_may_use: &[], pure: false },
 ];
 

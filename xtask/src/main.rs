@@ -1,10 +1,12 @@
-//! Chores of this repository that need more than cargo: `cargo xtask layers | bindings | wasm | bench motion`.
+//! Chores of this repository that need more than cargo: `cargo xtask layers | bindings | wasm | instruments |
+//! bench motion`.
 //!
 //! Knows the folders and the tools, nothing of printers. What a machine lacks is named, never installed.
 
 mod bench;
 mod bindings;
 mod callgrind;
+mod instruments;
 mod layers;
 mod sources;
 mod wasm;
@@ -34,6 +36,8 @@ enum Chore {
     },
     /// Build the planner for WebAssembly, with bindings for Node and the web
     Wasm,
+    /// Build the instruments for WebAssembly, for the page to load when they are opened
+    Instruments,
     /// Measure a part of the program
     Bench {
         #[command(subcommand)]
@@ -58,6 +62,7 @@ fn main() -> ExitCode {
         Chore::Layers => layers::run(),
         Chore::Bindings { check } => bindings::run(check),
         Chore::Wasm => wasm::run(),
+        Chore::Instruments => instruments::run(),
         Chore::Bench { subject: Subject::Motion { file, config } } => bench::motion(file, config),
     };
     match result {

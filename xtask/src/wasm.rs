@@ -27,6 +27,15 @@ pub(crate) fn run() -> Result<()> {
     ]))?;
     let module = target.join("wasm32-unknown-unknown").join("wasm").join("planner_wasm.wasm");
     let output = target.join(BINDINGS_FOLDER);
+    bind(&module, &output)?;
+    let page = workspace::root().join(PAGE_FOLDER);
+    copy_changed(&output.join("web"), &page)?;
+    println!("{}\n{}", output.display(), page.display());
+    Ok(())
+}
+
+/// Makes bindings for a module: `node/` and `web/` in the output folder.
+pub(crate) fn bind(module: &Path, output: &Path) -> Result<()> {
     workspace::run(
         workspace::cargo()
             .args([
@@ -37,12 +46,8 @@ pub(crate) fn run() -> Result<()> {
                 "--profile=tools",
                 "--",
             ])
-            .args([&module, &output]),
-    )?;
-    let page = workspace::root().join(PAGE_FOLDER);
-    copy_changed(&output.join("web"), &page)?;
-    println!("{}\n{}", output.display(), page.display());
-    Ok(())
+            .args([module, output]),
+    )
 }
 
 /// Copies a folder's files. Those that are the same already are left alone, so that nobody who watches them starts over.

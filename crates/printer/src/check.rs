@@ -1,19 +1,23 @@
 //! Reads a whole file before it is printed, as the printer would, and says what would go wrong.
 //!
-//! Plans nothing and takes no time worth mentioning: modal state, limits of the machine file, heaters' targets. What
+//! Plans nothing and takes no time worth mentioning: modal state, limits of the machine file, heaters' targets. (Who plans
+//! the file as well adds what only shows there: an extruder that has to step too fast along with the axes.) What
 //! depends on the hour (is the nozzle warm by now?) is judged by the targets. Bounded: a file with a million faults
 //! costs no more memory than one with a thousand.
 
 use gcode::{
     Action, CHORD_TOLERANCE, Diagnostic, Heater, Interpreter, LineNumber, Lines, Move, Settings, Severity,
+    VelocityLimit,
 };
+use motion::Limits;
 use units::Celsius;
 
 use crate::{
     config::{HeaterConfig, PrinterConfig},
     error::{ErrorCode, PrinterError},
     machine,
-    planner::{ExtrusionPermit, Guard},
+    planner::{ExtrusionPermit, Guard, PLAN_CLOCK},
+    step_rate::StepRates,
 };
 
 /// The most findings of each kind that are kept; the rest are counted.
@@ -56,11 +60,41 @@ impl CheckReport {
     }
 }
 
+/// How fast a machine may move and step.
+#[derive(Debug)]
+struct Speeds {
+    machine: Limits,
+    /// As lowered by the file.
+    limits: Limits,
+    step_rates: StepRates,
+}
+
+impl Speeds {
+    fn new(config: &PrinterConfig) -> Self {
+        let machine = machine::limits(config);
+        Self { machine, limits: machine, step_rates: StepRates::new(config, PLAN_CLOCK) }
+    }
+
+    fn limit(&mut self, limit: &VelocityLimit) {
+        let limits = machine::lowered(&self.machine, &self.limits, limit);
+        // Limits that make no sense leave those that hold.
+        if limits.check().is_ok() {
+            self.limits = limits;
+        }
+    }
+
+    fn judge(&self, mv: &Move) -> Result<(), PrinterError> {
+        let (from, to) = (mv.from.to_array(), mv.to.to_array());
+        self.step_rates.judge_request(from, to, mv.feed, &self.limits, mv.line)
+    }
+}
+
 /// Reads a file in pieces.
 #[derive(Debug)]
 pub struct Checker {
     config: Option<PrinterConfig>,
     guard: Option<Guard>,
+    speeds: Option<Speeds>,
     lines: Lines,
     interpreter: Interpreter,
     actions: Vec<Action>,
@@ -76,6 +110,7 @@ impl Checker {
         Self {
             config: config.cloned(),
             guard: config.map(Guard::new),
+            speeds: config.map(Speeds::new),
             lines: Lines::new(),
             interpreter: Interpreter::new(settings),
             actions: Vec::new(),
@@ -105,6 +140,8 @@ impl Checker {
     /// The file has ended: what came of it.
     pub fn finish(mut self) -> CheckReport {
         self.end_with(|_, _| {});
+        // What others have found came later than its line was read.
+        self.report.errors.sort_by_key(|error| error.line);
         let line = self.report.lines;
         if self.report.moves == 0 {
             self.error(ErrorCode::FileEmpty, "the file makes no move".into(), None);
@@ -165,6 +202,13 @@ impl Checker {
         }
     }
 
+    /// What somebody else has found, who plans the file.
+    pub(crate) fn add(&mut self, error: Option<PrinterError>) {
+        if let Some(error) = error {
+            self.keep(error);
+        }
+    }
+
     fn block(&mut self, line: u32, message: String) {
         if self.report.blocking.len() < FINDINGS_MAX {
             self.report.blocking.push(Blocking { line, message });
@@ -180,6 +224,11 @@ impl Checker {
             Action::Home { x, y, z } => self.home([x, y, z]),
             Action::SetTemperature { heater, target, .. } => self.target(heater, target, line),
             Action::WaitForTemperature { heater, .. } => _ = self.limits_of(heater, line),
+            Action::VelocityLimit(ref limit) => {
+                if let Some(speeds) = &mut self.speeds {
+                    speeds.limit(limit);
+                }
+            }
             Action::TurnOffHeaters => self.nozzle = Celsius::ZERO,
             Action::MotorsOff { x, y, z, .. } => {
                 if let Some(guard) = &mut self.guard {
@@ -209,9 +258,9 @@ impl Checker {
                 }
             }
         }
-        if let Some(guard) = &self.guard
-            && let Err(error) = guard.judge(mv)
-        {
+        let allowed = self.guard.as_ref().map_or(Ok(()), |guard| guard.judge(mv));
+        let possible = self.speeds.as_ref().map_or(Ok(()), |speeds| speeds.judge(mv));
+        if let Err(error) = allowed.and(possible) {
             self.keep(error);
         }
     }
@@ -320,6 +369,26 @@ mod tests {
         ] {
             assert_eq!(errors(text), [expected], "{text}");
         }
+    }
+
+    #[test]
+    fn what_no_driver_can_step_is_found_at_its_line() {
+        // 2560 steps/mm in X: with pulses of 2 µs 97 mm/s is the most.
+        let usual = include_str!("../../../samples/printer.cfg");
+        let text = usual.replacen("rotation_distance: 40", "rotation_distance: 1.25", 1);
+        let config = crate::config::parse(&text).0.expect("a machine");
+        let found = |text: &str| {
+            let mut checker = Checker::new(Some(&config));
+            checker.feed(text.as_bytes());
+            let errors = checker.finish().errors;
+            errors.iter().map(|error| (error.code, error.line)).collect::<Vec<_>>()
+        };
+        let too_fast = |line| vec![(ErrorCode::StepRateTooHigh, Some(line))];
+        assert_eq!(found("G28\nG1 X50 F5800\nG1 X5 Y100 F6500\n"), []);
+        assert_eq!(found("G28\nG1 X50 F5800\nG1 X5 F6000\n"), too_fast(3));
+        // A file that asks for less than its feed gets that.
+        assert_eq!(found("G28\nSET_VELOCITY_LIMIT VELOCITY=90\nG1 X50 F9000\n"), []);
+        assert_eq!(found("G28\nM220 S200\nG1 X50 F3000\n"), too_fast(3));
     }
 
     #[test]

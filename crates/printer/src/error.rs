@@ -149,6 +149,9 @@ catalogue! {
     WrongFirmware, "wrong-firmware":
         "The board answers, but not as Klipper-compatible firmware does", NOTHING_MOVED,
         "Flash Klipper-compatible firmware, or connect with a program that speaks this board's language.";
+    BoardUnreadable, "board-unreadable":
+        "The board answers, but nothing that can be read", NOTHING_MOVED,
+        "The baud rate is probably wrong: take the one that the firmware was built with (250000 and 115200 are common). Otherwise use a shorter cable without a hub.";
     DictionaryInvalid, "dictionary-invalid":
         "The board's description of itself cannot be read", NOTHING_MOVED,
         "Connect again; if it stays so, flash the firmware again.";
@@ -288,10 +291,10 @@ impl PrinterError {
         Self { code, detail: detail.into(), line: None, ended: Ended::Nothing }
     }
 
-    /// The same, with the line of the G-code that led to it.
+    /// The same, with the line of the G-code that led to it; 0 where none did.
     #[must_use]
     pub fn at_line(mut self, line: u32) -> Self {
-        self.line = Some(line);
+        self.line = Some(line).filter(|&line| line > 0);
         self
     }
 

@@ -15,4 +15,5 @@ pub mod move_queue;
 pub mod planner;
 pub mod preview;
 pub mod session;
+pub mod step_rate;
 pub mod thermistor;

@@ -174,6 +174,7 @@ impl UiEvent {
             Event::RunStarted { .. }
             | Event::Move(_)
             | Event::RunEnded { .. }
+            | Event::RunBroken { .. }
             | Event::Annotation(_)
             | Event::Object(_) => return None,
         })

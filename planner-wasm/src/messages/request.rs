@@ -2,9 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use printer::session::{JobOptions, Request};
+use printer::{
+    machine::EXTRUDER,
+    session::{JobOptions, Request},
+};
 use serde::Deserialize;
-use units::Celsius;
+use units::{Celsius, Mm, MmPerS};
 
 use super::HeaterName;
 
@@ -58,7 +61,7 @@ pub enum UiRequest {
         /// Which ones.
         axes: Vec<JogAxis>,
     },
-    /// Moves an axis from where it is. Positions in the console are absolute afterwards (`G90`).
+    /// Moves an axis from where it is. Modes and feed of what is typed stay as they are.
     Jog {
         /// Which one.
         axis: JogAxis,
@@ -103,10 +106,11 @@ impl From<UiRequest> for Request {
                 Self::Gcode("G28".chars().chain(words).collect())
             }
             UiRequest::Jog { axis, distance_mm, speed_mm_s } => {
-                Self::Gcode(relative_move(letter(axis), distance_mm, speed_mm_s))
+                let (distance, speed) = (Mm(distance_mm), MmPerS(speed_mm_s));
+                Self::MoveBy { axis: axis as usize, distance, speed }
             }
             UiRequest::Extrude { length_mm, speed_mm_s } => {
-                Self::Gcode(relative_move('E', length_mm, speed_mm_s))
+                Self::MoveBy { axis: EXTRUDER, distance: Mm(length_mm), speed: MmPerS(speed_mm_s) }
             }
             UiRequest::MotorsOff => Self::Gcode("M84".to_owned()),
             UiRequest::Pause => Self::Pause,
@@ -124,11 +128,6 @@ const fn letter(axis: JogAxis) -> char {
         JogAxis::Y => 'Y',
         JogAxis::Z => 'Z',
     }
-}
-
-/// Numbers are written plainly, without exponents, and to a micrometre.
-fn relative_move(letter: char, distance_mm: f64, speed_mm_s: f64) -> String {
-    format!("G91\nG1 {letter}{distance_mm:.3} F{:.3}\nG90", speed_mm_s * 60.0)
 }
 
 /// What a job is started with.
@@ -170,7 +169,11 @@ mod tests {
         assert_eq!(request(r#"{"type":"home","axes":[]}"#), Request::Gcode("G28".into()));
         assert_eq!(
             request(r#"{"type":"jog","axis":"z","distance_mm":-1e-1,"speed_mm_s":10}"#),
-            Request::Gcode("G91\nG1 Z-0.100 F600.000\nG90".into())
+            Request::MoveBy { axis: 2, distance: Mm(-0.1), speed: MmPerS(10.0) }
+        );
+        assert_eq!(
+            request(r#"{"type":"extrude","length_mm":-5,"speed_mm_s":3}"#),
+            Request::MoveBy { axis: EXTRUDER, distance: Mm(-5.0), speed: MmPerS(3.0) }
         );
     }
 

@@ -27,9 +27,9 @@ pub struct Snapshot {
     pub job: JobView,
     /// Motion that the board has and has not made; `null` outside of a run.
     pub queued_s: Option<f64>,
-    /// As last set here; 1 is as written.
+    /// Of what is planned from now on, whoever set it: the page, or an `M220`. 1 is as written.
     pub speed_factor: f64,
-    /// As last set here; 1 is as written.
+    /// The same of the extrusion (`M221`).
     pub flow_factor: f64,
     /// The part fan, 0 … 1.
     pub fan: f64,
@@ -104,6 +104,9 @@ pub struct JobView {
     pub elapsed_s: f64,
     /// How much of its file has been taken; a double counts bytes exactly up to 2⁵³.
     pub fed_bytes: f64,
+    /// The least motion that the board had since the print's start, while more of it was to come. `null` before there was
+    /// any.
+    pub queued_least_s: Option<f64>,
 }
 
 /// Counts of a link since the connection began.

@@ -33,12 +33,14 @@ export interface Painter {
   drawSlice(budget: number, restart: boolean): Drawn;
   /** Mends the complete picture after a small change; false if it has to be drawn anew. */
   patch(): boolean;
+  /** Shows the complete picture again, with what lies over it as it is now. */
+  overlay(): void;
   /** A question whether the GPU has done all that was asked of it. */
   fence(): () => boolean;
 }
 
 export interface FrameReport {
-  readonly kind: 'quick' | 'full' | 'patch';
+  readonly kind: 'quick' | 'full' | 'patch' | 'overlay';
   readonly segments: number;
   /** From the first command until the GPU was done; for a full picture the longest slice. */
   readonly longestMs: Ms;
@@ -67,6 +69,7 @@ export class FrameLoop {
   #quickWanted = false;
   #fullWanted = false;
   #patchWanted = false;
+  #overlayWanted = false;
   #picture: Picture = 'none';
   #pictureBegan: Ms = 0;
   #pictureSegments = 0;
@@ -109,6 +112,13 @@ export class FrameLoop {
     this.#schedule();
   }
 
+  /** What lies over the picture has changed; pictures in motion and new ones show it anyway. */
+  overlaid(): void {
+    if (this.#picture !== 'complete') return;
+    this.#overlayWanted = true;
+    this.#schedule();
+  }
+
   /** Draws no more until {@link resume}. */
   pause(): void {
     this.#stopped = true;
@@ -143,6 +153,7 @@ export class FrameLoop {
     if (this.#quickWanted) {
       this.#quickWanted = false;
       this.#patchWanted = false;
+      this.#overlayWanted = false;
       const segments = this.#painter.drawQuick(this.#quickBudget.segments);
       this.#await(began, (elapsed) => {
         this.#quickBudget.measured(segments, elapsed);
@@ -153,10 +164,20 @@ export class FrameLoop {
     } else if (this.#patchWanted) {
       this.#patchWanted = false;
       if (this.#picture !== 'complete' || !this.#painter.patch()) return this.redraw();
-      this.#await(began, (elapsed) =>
-        this.#report({ kind: 'patch', segments: 0, longestMs: elapsed, totalMs: elapsed }),
-      );
+      this.#overlayWanted = false;
+      this.#awaitSmall('patch', began);
+    } else if (this.#overlayWanted) {
+      this.#overlayWanted = false;
+      if (this.#picture !== 'complete') return;
+      this.#painter.overlay();
+      this.#awaitSmall('overlay', began);
     }
+  }
+
+  #awaitSmall(kind: 'patch' | 'overlay', began: Ms): void {
+    this.#await(began, (elapsed) =>
+      this.#report({ kind, segments: 0, longestMs: elapsed, totalMs: elapsed }),
+    );
   }
 
   #drawSlice(began: Ms): void {
@@ -171,6 +192,7 @@ export class FrameLoop {
     this.#pictureSegments += segments;
     if (complete) {
       this.#fullWanted = false;
+      this.#overlayWanted = false;
       this.#picture = 'complete';
     }
     this.#await(began, (elapsed) => {
@@ -193,7 +215,7 @@ export class FrameLoop {
         return;
       }
       done(elapsed);
-      if (this.#quickWanted || this.#fullWanted || this.#patchWanted) this.#schedule();
+      if (this.#quickWanted || this.#fullWanted || this.#patchWanted || this.#overlayWanted) this.#schedule();
     };
     this.#poll = this.#clock.setTimer(poll, 0);
   }

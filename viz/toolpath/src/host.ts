@@ -5,7 +5,7 @@
  */
 
 import type { Bed } from './bed';
-import type { CameraState } from './camera';
+import type { CameraState, Vec3 } from './camera';
 import type { Layer } from './layers';
 import { carryOut, type ViewEvent, type ViewRequest, type WorkerRequest } from './messages';
 import type { Theme } from './palette';
@@ -81,6 +81,9 @@ export class ToolpathHost {
   }
   setPrintedUpTo(vertex: VertexIndex | null): void {
     this.send({ type: 'setPrintedUpTo', vertex });
+  }
+  setNozzle(at: Vec3 | null): void {
+    this.send({ type: 'setNozzle', at });
   }
   setTheme(theme: Theme): void {
     this.send({ type: 'setTheme', theme });

@@ -5,7 +5,7 @@
  * worker that makes vertices), so that they do not pass through the main thread.
  */
 import type { Bed } from './bed';
-import type { CameraState } from './camera';
+import type { CameraState, Vec3 } from './camera';
 import type { FrameReport } from './frames';
 import type { Layer } from './layers';
 import type { Theme } from './palette';
@@ -22,6 +22,7 @@ export type ViewRequest =
   | { readonly type: 'setLayers'; readonly layers: readonly Layer[] }
   | { readonly type: 'show'; readonly shown: Partial<Shown> }
   | { readonly type: 'setPrintedUpTo'; readonly vertex: VertexIndex | null }
+  | { readonly type: 'setNozzle'; readonly at: Vec3 | null }
   | { readonly type: 'setTheme'; readonly theme: Theme }
   | { readonly type: 'orbit'; readonly dx: CssPx; readonly dy: CssPx }
   | { readonly type: 'pan'; readonly dx: CssPx; readonly dy: CssPx }
@@ -63,6 +64,8 @@ export function carryOut(view: ToolpathView, request: ViewRequest): void {
       return view.show(request.shown);
     case 'setPrintedUpTo':
       return view.setPrintedUpTo(request.vertex);
+    case 'setNozzle':
+      return view.setNozzle(request.at);
     case 'setTheme':
       return view.setTheme(request.theme);
     case 'orbit':

@@ -16,12 +16,14 @@ import {
   orbit,
   pan,
   unionOf,
+  type Vec3,
   zoom,
 } from './camera';
 import { VertexStore } from './chunks';
 import { Rough } from './coarse';
 import { type Drawn, FrameLoop, type FrameReport, type Painter, realmClock } from './frames';
 import { type Layer, LayerList, type VertexRange } from './layers';
+import { NozzleObject } from './nozzle';
 import { featureMask, PALETTES, type Palette, type Theme } from './palette';
 import { ALL_PRINTED, PathObjects } from './path';
 import { Stage, type Surface } from './stage';
@@ -88,6 +90,7 @@ export class ToolpathView {
   readonly #coarse = new PathObjects('body');
   readonly #bedObjects = new BedObjects();
   readonly #bedScene = new Scene();
+  readonly #nozzle = new NozzleObject();
   readonly #loop: FrameLoop;
   #store: VertexStore | null = null;
   #rough: Rough | null = null;
@@ -188,10 +191,19 @@ export class ToolpathView {
     this.#loop.patched();
   }
 
+  /** Shows the nozzle with its tip there; null shows none. */
+  setNozzle(at: Vec3 | null): void {
+    const place = at?.every(Number.isFinite) ? at : null;
+    if (place === null && !this.#nozzle.isShown) return;
+    this.#nozzle.at = place;
+    this.#loop.overlaid();
+  }
+
   setTheme(theme: Theme): void {
     this.#palette = PALETTES[theme];
     for (const path of [this.#fine, this.#coarse]) path.palette = this.#palette;
     this.#bedObjects.palette = this.#palette;
+    this.#nozzle.colour = this.#palette.nozzle;
     this.#stage.background = this.#palette.background;
     this.#loop.moved();
   }
@@ -220,6 +232,7 @@ export class ToolpathView {
     this.#stage.resize(width, height, ratio);
     const angle = (2 * Math.tan(FIELD_OF_VIEW / 2)) / (this.#stage.size.height * this.#stage.ratio);
     for (const path of [this.#fine, this.#coarse]) path.setPixels(angle, this.#stage.ratio);
+    this.#nozzle.pixelAngle = angle * this.#stage.ratio;
     this.#loop.moved();
   }
 
@@ -229,6 +242,7 @@ export class ToolpathView {
     this.#canvas.removeEventListener('webglcontextrestored', this.#onRestored);
     this.#empty();
     this.#bedObjects.clear();
+    this.#nozzle.release();
     this.#stage.dispose();
   }
 
@@ -238,6 +252,7 @@ export class ToolpathView {
     this.#fine.clear();
     this.#coarse.clear();
     this.#bedObjects.clear();
+    this.#nozzle.release();
     this.#stage.lost();
     this.#events.onContextLost?.();
   };
@@ -306,6 +321,16 @@ export class ToolpathView {
     this.#stage.draw(surface, this.#fine.scene);
   }
 
+  /** What lies over the picture. */
+  #overlay(): void {
+    if (this.#nozzle.isShown) this.#stage.draw('canvas', this.#nozzle.scene);
+  }
+
+  #present(): void {
+    this.#stage.present();
+    this.#overlay();
+  }
+
   #linesShown(): boolean {
     const { travel, retractions, seams } = this.#shown;
     return travel || retractions || seams;
@@ -320,15 +345,20 @@ export class ToolpathView {
       drawQuick: (budget) => this.#drawQuick(budget),
       drawSlice: (budget, restart) => this.#drawSlice(budget, restart),
       patch: () => this.#patch(),
+      overlay: () => this.#present(),
       fence: () => this.#stage.fence(),
     };
   }
 
   #drawQuick(budget: number): number {
     this.#prepare('canvas');
+    const segments = this.#rough ? this.#drawRough(this.#rough, budget) : 0;
+    this.#overlay();
+    return segments;
+  }
+
+  #drawRough(rough: Rough, budget: number): number {
     const range = this.#range();
-    const rough = this.#rough;
-    if (!rough) return 0;
     const { ranges, layerStep, stride } = rough.reduced(range, this.#layers, budget);
     const parts = ranges.flatMap((part) => rough.store.split(part));
     const segments = ranges.reduce((sum, { first, end }) => sum + end - first, 0) / stride;
@@ -375,7 +405,7 @@ export class ToolpathView {
       progress.at = range.first;
     }
     const complete = progress.phase === 'done';
-    if (complete) this.#stage.present();
+    if (complete) this.#present();
     if (complete && progress.printed !== this.#printed) this.#loop.patched();
     return { segments, complete };
   }
@@ -390,7 +420,7 @@ export class ToolpathView {
     this.#fine.printed = to;
     if (part.end > part.first) this.#beads('picture', part);
     this.#progress.printed = to;
-    this.#stage.present();
+    this.#present();
     return true;
   }
 }

@@ -43,7 +43,7 @@ class TestClock implements FrameClock {
 function setUp(total: number, msPerSegment: number) {
   const clock = new TestClock();
   const reports: FrameReport[] = [];
-  let [busyUntil, at, patches] = [0, 0, 0];
+  let [busyUntil, at, patches, overlays] = [0, 0, 0, 0];
   const spend = (segments: number): number => {
     busyUntil = clock.time + 3 + segments * msPerSegment;
     return segments;
@@ -61,10 +61,14 @@ function setUp(total: number, msPerSegment: number) {
       patches += 1;
       return true;
     },
+    overlay: () => {
+      overlays += 1;
+      spend(0);
+    },
     fence: () => () => clock.time >= busyUntil,
   };
   const loop = new FrameLoop(painter, clock, (report) => reports.push(report));
-  return { clock, loop, reports, patches: () => patches };
+  return { clock, loop, reports, patches: () => patches, overlays: () => overlays };
 }
 
 describe('the loop of frames', () => {
@@ -116,6 +120,21 @@ describe('the loop of frames', () => {
     clock.run(4_000);
     expect(patches()).toBe(1);
     expect(reports.filter(({ kind }) => kind === 'full')).toHaveLength(1);
+  });
+
+  test('what lies over the picture moves without drawing the picture anew', () => {
+    const { clock, loop, reports, overlays } = setUp(300_000, 0.001);
+    loop.overlaid();
+    expect(clock.idle).toBe(true);
+    loop.moved();
+    clock.run(3_000);
+    for (let step = 0; step < 10; step++) {
+      loop.overlaid();
+      clock.run(clock.time + 100);
+    }
+    expect(overlays()).toBe(10);
+    expect(reports.filter(({ kind }) => kind === 'full')).toHaveLength(1);
+    expect(clock.idle).toBe(true);
   });
 
   test('a lost context stops it, a restored one starts it again', () => {

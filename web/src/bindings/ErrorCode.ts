@@ -29,6 +29,7 @@ export type ErrorCode =
   | 'pin-unknown'
   | 'board-silent'
   | 'wrong-firmware'
+  | 'board-unreadable'
   | 'dictionary-invalid'
   | 'dictionary-incomplete'
   | 'config-mismatch'

@@ -21,4 +21,9 @@ elapsed_s: Seconds,
 /**
  * How much of its file has been taken; a double counts bytes exactly up to 2⁵³.
  */
-fed_bytes: Bytes, };
+fed_bytes: Bytes, 
+/**
+ * The least motion that the board had since the print's start, while more of it was to come. `null` before there was
+ * any.
+ */
+queued_least_s: Seconds | null, };

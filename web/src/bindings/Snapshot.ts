@@ -48,11 +48,11 @@ job: JobView,
  */
 queued_s: Seconds | null, 
 /**
- * As last set here; 1 is as written.
+ * Of what is planned from now on, whoever set it: the page, or an `M220`. 1 is as written.
  */
 speed_factor: number, 
 /**
- * As last set here; 1 is as written.
+ * The same of the extrusion (`M221`).
  */
 flow_factor: number, 
 /**

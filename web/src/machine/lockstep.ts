@@ -97,7 +97,11 @@ export class LockstepLoop {
         this.#wakeUp = undefined;
         resolve();
       };
-      const timer = setTimeout(end, ms);
+      const due = this.#realNow() + ms / 1000;
+      const timer = setTimeout(() => {
+        this.#machine.woke((this.#realNow() - due) as Seconds);
+        end();
+      }, ms);
       this.#wakeUp = end;
     });
   }

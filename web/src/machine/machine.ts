@@ -2,14 +2,20 @@
 //
 // The loops (realtime.ts, lockstep.ts) give it bytes and time; it gives them bytes and the next wake-up. Knows neither
 // clocks nor ports.
-import type { Seconds } from '../units';
+import { type Seconds, seconds } from '../units';
 import { Feeder } from './feeder';
-import type { FromMachine, MachineEvent, Trouble, Wish } from './protocol';
+import type { FromMachine, MachineEvent, Trouble, WakeUps, Wish } from './protocol';
 import type { Session } from './session';
 import { fileUnreadable } from './troubles';
 
 /** Events that wait to be told; the oldest go first beyond that, and the page is told how many. */
 const EVENTS_MAX = 2000;
+/** A wake-up that comes later than this after it was asked for is told: the computer slept or was very busy. */
+const MISSED_MIN = seconds(1);
+/** Of the planned speed, this much is told: what was … */
+const SPEED_BEHIND = seconds(20);
+/** … and what comes: a little more than the session plans ahead. */
+const SPEED_AHEAD = seconds(5);
 
 export class Machine {
   readonly session: Session;
@@ -19,6 +25,9 @@ export class Machine {
   #starting = false;
   #events: MachineEvent[] = [];
   #dropped = 0;
+  #wakeUps: WakeUps = { missed: 0, latest: seconds(0) };
+  /** Whether the planned speed is told. */
+  watchesSpeed = false;
 
   constructor(session: Session, tell: (message: FromMachine) => void, lineErrors: () => number) {
     this.session = session;
@@ -36,6 +45,14 @@ export class Machine {
     const bytes = this.session.poll(now);
     this.#collect();
     return bytes;
+  }
+
+  /** A timer came this much later than it was asked for. */
+  woke(late: Seconds): void {
+    const { missed, latest } = this.#wakeUps;
+    const isMissed = late > MISSED_MIN;
+    if (isMissed) this.#tell({ kind: 'gap', seconds: late });
+    this.#wakeUps = { missed: missed + (isMissed ? 1 : 0), latest: late > latest ? late : latest };
   }
 
   #feed(now: Seconds): void {
@@ -87,7 +104,9 @@ export class Machine {
     this.#events = [];
     const snapshot = this.session.snapshot(now);
     const link = snapshot.link && { ...snapshot.link, lineErrors: this.#lineErrors() };
-    this.#tell({ kind: 'snapshot', snapshot: { ...snapshot, link } });
+    this.#tell({ kind: 'snapshot', snapshot: { ...snapshot, link, wakeUps: this.#wakeUps } });
+    if (!this.watchesSpeed) return;
+    this.#tell({ kind: 'planned-speed', pairs: this.session.plannedSpeed(now, SPEED_BEHIND, SPEED_AHEAD) });
   }
 
   wish(wish: Wish, now: Seconds): Trouble | null {

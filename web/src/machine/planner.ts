@@ -4,15 +4,15 @@ import type { JobRequest } from '../bindings/JobRequest';
 import type { Snapshot as PlannerSnapshot } from '../bindings/Snapshot';
 import type { UiEvent } from '../bindings/UiEvent';
 import type { UiRequest } from '../bindings/UiRequest';
+import type { VirtualState } from '../bindings/VirtualState';
 import initialise, { PrinterSession, VirtualPrinter } from '../bindings/wasm/planner_wasm.js';
 import { inWords, plannerTrouble } from '../planner_error';
 import { celsius, mm, type Seconds, seconds, share } from '../units';
 import type { Axis, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
-import type { Session, SimulatedPrinter } from './session';
+import type { Session, SessionSnapshot, SimulatedPrinter } from './session';
 
 /** Speeds of moves by hand, mm/s; the machine's own limits hold besides. */
 const JOG_SPEED: Record<Axis, number> = { X: 100, Y: 100, Z: 10 };
-const EXTRUDE_SPEED = 3;
 const AXES = ['X', 'Y', 'Z'] as const;
 
 const lower = (axis: Axis): 'x' | 'y' | 'z' => axis.toLowerCase() as 'x' | 'y' | 'z';
@@ -64,7 +64,7 @@ function toRequest(wish: Wish): UiRequest {
         speed_mm_s: JOG_SPEED[wish.axis],
       };
     case 'extrude':
-      return { type: 'extrude', length_mm: wish.length, speed_mm_s: EXTRUDE_SPEED };
+      return { type: 'extrude', length_mm: wish.length, speed_mm_s: wish.speed };
     case 'temperature':
       return { type: 'set-temperature', heater: wish.heater, target_c: wish.target };
     case 'fan':
@@ -116,7 +116,7 @@ function fromEvent(event: UiEvent): MachineEvent | null {
 type Place = readonly [number, number, number, number];
 const place = ([x, y, z, e]: Place): NonNullable<Snapshot['position']> => [mm(x), mm(y), mm(z), mm(e)];
 
-function fromSnapshot(now: PlannerSnapshot): Snapshot {
+function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
   const position = now.live_mm ?? now.position_mm;
   const { link } = now;
   return {
@@ -133,6 +133,7 @@ function fromSnapshot(now: PlannerSnapshot): Snapshot {
     line: now.job.line,
     elapsed: seconds(now.job.elapsed_s),
     queued: now.queued_s === null ? null : seconds(now.queued_s),
+    queuedLeast: now.job.queued_least_s === null ? null : seconds(now.job.queued_least_s),
     speedFactor: share(now.speed_factor),
     flowFactor: share(now.flow_factor),
     fan: share(now.fan),
@@ -194,7 +195,11 @@ class WasmSession implements Session {
     this.#inner.job_end();
   }
 
-  snapshot(now: Seconds): Snapshot {
+  plannedSpeed(now: Seconds, behind: Seconds, ahead: Seconds): Float64Array<ArrayBuffer> {
+    return this.#inner.planned_speed(now, behind, ahead) as Float64Array<ArrayBuffer>;
+  }
+
+  snapshot(now: Seconds): SessionSnapshot {
     return fromSnapshot(JSON.parse(this.#inner.snapshot(now)) as PlannerSnapshot);
   }
 
@@ -220,6 +225,10 @@ class WasmPrinter implements SimulatedPrinter {
 
   runUntil(until: Seconds): Uint8Array<ArrayBuffer> {
     return this.#inner.run_until_s(until) as Uint8Array<ArrayBuffer>;
+  }
+
+  record(): VirtualState {
+    return JSON.parse(this.#inner.state()) as VirtualState;
   }
 
   free(): void {

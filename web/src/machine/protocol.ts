@@ -1,6 +1,7 @@
 // What the page and the machine worker say to each other, and the machine as the page sees it.
 // Shapes only. Values that come from the planner are described here in the page's own words; machine/planner.ts
 // makes them from the planner's.
+import type { VirtualState } from '../bindings/VirtualState';
 import type { PortId } from '../transport/web_serial';
 import type { Celsius, Mm, Seconds, Share } from '../units';
 
@@ -45,6 +46,13 @@ export interface LinkCounts {
   readonly lineErrors: number;
 }
 
+/** How late the worker's timers were since the connection began. */
+export interface WakeUps {
+  /** So many by more than a second: the computer slept, or was very busy. */
+  readonly missed: number;
+  readonly latest: Seconds;
+}
+
 /** The machine now. Sent several times a second. */
 export interface Snapshot {
   readonly phase: Phase;
@@ -59,10 +67,13 @@ export interface Snapshot {
   readonly elapsed: Seconds;
   /** Motion that the board has and has not made yet; null while none is being made. */
   readonly queued: Seconds | null;
+  /** The least of it since the print's start, while more was to come. */
+  readonly queuedLeast: Seconds | null;
   readonly speedFactor: Share;
   readonly flowFactor: Share;
   readonly fan: Share;
   readonly link: LinkCounts | null;
+  readonly wakeUps: WakeUps;
 }
 
 /** What the page is told in words, in the order in which it happened. */
@@ -80,7 +91,8 @@ export type Wish =
   | { readonly kind: 'gcode'; readonly text: string }
   | { readonly kind: 'home'; readonly axes: readonly Axis[] }
   | { readonly kind: 'jog'; readonly axis: Axis; readonly distance: Mm }
-  | { readonly kind: 'extrude'; readonly length: Mm }
+  /** `speed` in mm/s of filament. */
+  | { readonly kind: 'extrude'; readonly length: Mm; readonly speed: number }
   | { readonly kind: 'temperature'; readonly heater: HeaterName; readonly target: Celsius }
   | { readonly kind: 'fan' | 'speed-factor' | 'flow-factor'; readonly value: Share }
   | { readonly kind: 'motors-off' | 'pause' | 'resume' | 'cancel' | 'emergency-stop' | 'firmware-restart' };
@@ -105,7 +117,9 @@ export type ToMachine =
       readonly file: Blob;
       readonly confirmedLines: readonly number[];
     }
-  | { readonly kind: 'speed'; readonly speed: number };
+  | { readonly kind: 'speed'; readonly speed: number }
+  /** Whether `planned-speed` is wanted. Holds for all connections until it is changed. */
+  | { readonly kind: 'watch-speed'; readonly on: boolean };
 
 export type FromMachine =
   /** The planner is loaded: connections can be made. */
@@ -114,6 +128,13 @@ export type FromMachine =
   /** The connection is over; `trouble` says why, where the user did not end it. */
   | { readonly kind: 'closed'; readonly trouble: Trouble | null }
   | { readonly kind: 'snapshot'; readonly snapshot: Snapshot }
+  /** The virtual printer's own record: what its motors, heaters and switches did, whatever the session believes. */
+  | { readonly kind: 'record'; readonly record: VirtualState }
+  /**
+   * The toolhead's planned speed around now, with each snapshot while it is watched: pairs of time (s, relative to now,
+   * ascending) and speed (mm/s), between which it changes evenly. Rest is zero; empty while the board is not ready.
+   */
+  | { readonly kind: 'planned-speed'; readonly pairs: Float64Array<ArrayBuffer> }
   | { readonly kind: 'events'; readonly events: readonly MachineEvent[] }
   /** What came of a wish or of a print's start. */
   | { readonly kind: 'answer'; readonly id: number; readonly trouble: Trouble | null }

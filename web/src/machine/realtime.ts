@@ -5,13 +5,9 @@ import type { Transport } from '../transport/transport';
 import type { Seconds } from '../units';
 import type { Machine } from './machine';
 
-/** A wake-up that comes later than this after it was asked for is told: the computer slept or was very busy. */
-const GAP_MIN_S = 1;
-
 export interface LoopOptions {
   readonly machine: Machine;
   readonly now: () => Seconds;
-  readonly onGap: (gap: Seconds) => void;
   /** Bytes as they come, for those who judge what is on the other end. */
   readonly onBytes: (bytes: Uint8Array) => void;
 }
@@ -61,8 +57,7 @@ export class RealTimeLoop {
     const wake = machine.session.wake();
     const delay = Math.max(0, (wake - now()) * 1000);
     this.#timer = setTimeout(() => {
-      const late = now() - wake;
-      if (late > GAP_MIN_S) this.#options.onGap(late as Seconds);
+      machine.woke((now() - wake) as Seconds);
       this.tick();
     }, delay);
   };

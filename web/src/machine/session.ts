@@ -1,7 +1,11 @@
 // The planner's session as the worker uses it: the generated class behind the page's own types.
 // Knows no port and no clock: bytes and time are arguments.
+import type { VirtualState } from '../bindings/VirtualState';
 import type { Seconds } from '../units';
 import type { MachineEvent, Snapshot, Trouble, Wish } from './protocol';
+
+/** What a session knows of a snapshot; the rest is its owner's. */
+export type SessionSnapshot = Omit<Snapshot, 'wakeUps'>;
 
 export interface Session {
   receive(bytes: Uint8Array, now: Seconds): void;
@@ -17,7 +21,9 @@ export interface Session {
   jobWants(): number;
   jobFeed(bytes: Uint8Array): void;
   jobEnd(): void;
-  snapshot(now: Seconds): Snapshot;
+  snapshot(now: Seconds): SessionSnapshot;
+  /** Pairs of time (s, relative to now) and the toolhead's planned speed (mm/s). */
+  plannedSpeed(now: Seconds, behind: Seconds, ahead: Seconds): Float64Array<ArrayBuffer>;
   free(): void;
 }
 
@@ -27,5 +33,7 @@ export interface SimulatedPrinter {
   write(bytes: Uint8Array): void;
   /** Lets time pass until `until`, or until bytes come; returns those. */
   runUntil(until: Seconds): Uint8Array<ArrayBuffer>;
+  /** The machine as an onlooker sees it. */
+  record(): VirtualState;
   free(): void;
 }

@@ -16,7 +16,7 @@ const trouble = (code: string, happened: string, safe: string, todo: string): Tr
   todo,
 });
 
-const PORT: Record<PortFailureCode, readonly [string, string, string]> = {
+const PORT: Record<PortFailureCode | 'port-unusable', readonly [string, string, string]> = {
   unplugged: [
     'The printer was unplugged, or its board switched off.',
     ON_ITS_OWN,
@@ -37,6 +37,11 @@ const PORT: Record<PortFailureCode, readonly [string, string, string]> = {
     ON_ITS_OWN,
     'Check the baud rate, use a shorter cable without a hub, then connect again and home.',
   ],
+  'port-unusable': [
+    'The browser could not use the port.',
+    NOTHING_MOVED,
+    'Reload the page and choose the port again. If it stays so, please report it with the diagnostic report.',
+  ],
 };
 
 const detail = (error: unknown): string => {
@@ -44,9 +49,9 @@ const detail = (error: unknown): string => {
   return error instanceof Error ? error.message : String(error);
 };
 
-/** A port's failure. */
+/** A port's failure; what is not a port's own error came before anything was sent. */
 export function portTrouble(error: unknown): Trouble {
-  const code = error instanceof PortError ? error.code : 'port-error';
+  const code = error instanceof PortError ? error.code : 'port-unusable';
   const [happened, safe, todo] = PORT[code];
   const text = detail(error);
   return trouble(code, text ? `${happened} (${text})` : happened, safe, todo);

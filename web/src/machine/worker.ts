@@ -2,6 +2,7 @@
 //
 // Nothing here waits for the page. A Web Lock is held from before the port is opened to after it is closed, so that
 // one tab has a printer; a tab that holds a lock is not frozen either.
+import type { VirtualState } from '../bindings/VirtualState';
 import { ANSWER_BYTES_MAX, classify } from '../transport/answer';
 import { PortError } from '../transport/transport';
 import { find, openSerial } from '../transport/web_serial';
@@ -16,25 +17,30 @@ import { answerTrouble, plannerMissing, portInUse, portTrouble, workerDied } fro
 /** How often the page is told how things are, in ms. */
 const TELL_MS = 100;
 /** Errors for which the first bytes may know a better reason. */
-const UNIDENTIFIED = new Set(['board-silent', 'wrong-firmware']);
+const UNIDENTIFIED = new Set(['board-silent', 'board-unreadable', 'wrong-firmware']);
 
 interface Connection {
   readonly machine: Machine;
   readonly now: () => Seconds;
   readonly tick: () => void;
   readonly setSpeed: (speed: number) => void;
+  /** The printer's own record, where it is a virtual one. */
+  readonly record: (() => VirtualState) | null;
   /** Ends the connection; the lock is let go after it. */
   readonly end: (trouble: Trouble | null) => Promise<void>;
 }
 
-const scope = self as unknown as { postMessage(message: FromMachine): void };
+const scope = self as unknown as { postMessage(message: FromMachine, transfer: Transferable[]): void };
 const realNow = (): Seconds => seconds(performance.now() / 1000);
 
 let planner: Planner | undefined;
 let connection: Connection | undefined;
 let opening: { cancelled: boolean } | undefined;
+/** Whether the page shows the planned speed; outlives connections. */
+let watchesSpeed = false;
 
-const tell = (message: FromMachine): void => scope.postMessage(message);
+const tell = (message: FromMachine): void =>
+  scope.postMessage(message, message.kind === 'planned-speed' ? [message.pairs.buffer] : []);
 
 /** What the port's board said before it was identified, to judge what it is. */
 class FirstBytes {
@@ -56,19 +62,15 @@ class FirstBytes {
   }
 }
 
-/** Runs `body` with the lock, or not at all. */
-async function withLock(name: string, body: () => Promise<void>): Promise<boolean> {
-  return await navigator.locks.request(name, { ifAvailable: true }, async (lock) => {
-    if (!lock) return false;
-    await body();
-    return true;
-  });
+/** Runs `body` with the lock, or not at all; why the connection ended. */
+async function withLock(name: string, body: () => Promise<Trouble | null>): Promise<Trouble | null> {
+  return await navigator.locks.request(name, { ifAvailable: true }, (lock) => (lock ? body() : portInUse()));
 }
 
-/** The loop is up: tells the page, until the connection is over. */
+/** The loop is up: tells the page, until the connection is over; returns why it is. */
 function hold(
   make: (over: (trouble: Trouble | null) => void) => Omit<Connection, 'end'> & { stop: () => Promise<void> },
-): Promise<void> {
+): Promise<Trouble | null> {
   return new Promise((resolve) => {
     let over = false;
     const end = async (trouble: Trouble | null): Promise<void> => {
@@ -77,15 +79,19 @@ function hold(
       clearInterval(timer);
       connection = undefined;
       // While there still is a clock to ask: stopping lets go of the virtual printer.
-      parts.machine.tell(parts.now());
+      tellAll();
       await parts.stop();
       parts.machine.free();
-      tell({ kind: 'closed', trouble });
-      resolve();
+      resolve(trouble);
     };
     const parts = make((trouble) => void end(trouble));
     connection = { ...parts, end };
-    const timer = setInterval(() => parts.machine.tell(parts.now()), TELL_MS);
+    parts.machine.watchesSpeed = watchesSpeed;
+    const tellAll = (): void => {
+      parts.machine.tell(parts.now());
+      if (parts.record) tell({ kind: 'record', record: parts.record() });
+    };
+    const timer = setInterval(tellAll, TELL_MS);
     tell({ kind: 'opened' });
   });
 }
@@ -94,11 +100,11 @@ async function connectSerial(
   loaded: Planner,
   choice: PortChoice & { kind: 'serial' },
   config: string,
-): Promise<void> {
+): Promise<Trouble | null> {
   const port = find(choice.id, await navigator.serial.getPorts());
   if (!port) throw new PortError('port-gone');
   const name = `stepcast-port:${choice.id.vendor}:${choice.id.product}:${choice.id.index}`;
-  const held = await withLock(name, async () => {
+  return await withLock(name, async () => {
     // Before the port is touched: the machine's file may have errors.
     const session = loaded.openSession(config, realNow());
     const transport = await openSerial(port, choice.baud).catch((error: unknown) => {
@@ -108,11 +114,10 @@ async function connectSerial(
     if (opening?.cancelled) {
       session.free();
       await transport.close();
-      tell({ kind: 'closed', trouble: null });
-      return;
+      return null;
     }
     const first = new FirstBytes();
-    await hold((over) => {
+    return await hold((over) => {
       const machine = new Machine(
         session,
         (message) => tell(first.explain(message)),
@@ -121,24 +126,29 @@ async function connectSerial(
       const loop = new RealTimeLoop(transport, {
         machine,
         now: realNow,
-        onGap: (gap) => tell({ kind: 'gap', seconds: gap }),
         onBytes: (bytes) => first.take(bytes),
       });
       void transport.lost.then((error) => over(portTrouble(error)));
       loop.start();
-      return { machine, now: realNow, tick: loop.tick, setSpeed: () => undefined, stop: () => loop.stop() };
+      return {
+        machine,
+        now: realNow,
+        tick: loop.tick,
+        setSpeed: () => undefined,
+        record: null,
+        stop: () => loop.stop(),
+      };
     });
   });
-  if (!held) tell({ kind: 'closed', trouble: portInUse() });
 }
 
 async function connectVirtual(
   loaded: Planner,
   choice: PortChoice & { kind: 'virtual' },
   config: string,
-): Promise<void> {
+): Promise<Trouble | null> {
   // Every tab has a printer of its own; the lock only keeps the tab from being frozen.
-  await withLock(`stepcast-virtual:${crypto.randomUUID()}`, () =>
+  return await withLock(`stepcast-virtual:${crypto.randomUUID()}`, () =>
     hold((over) => {
       const printer = loaded.powerUp(config, choice.board, choice.seed, choice.faults);
       const now = (): Seconds => printer.now();
@@ -151,6 +161,7 @@ async function connectVirtual(
         now,
         tick: loop.tick,
         setSpeed: (speed) => loop.setSpeed(speed),
+        record: () => printer.record(),
         stop: () => loop.stop(),
       };
     }),
@@ -160,17 +171,21 @@ async function connectVirtual(
 async function connect(message: ToMachine & { kind: 'connect' }): Promise<void> {
   if (connection || opening) return;
   opening = { cancelled: false };
+  const trouble = await carryOut(message);
+  // Only now, with port and lock let go of, may the page ask for the next connection.
+  opening = undefined;
+  tell({ kind: 'closed', trouble });
+}
+
+/** A connection from its beginning to its end; why it ended. */
+async function carryOut(message: ToMachine & { kind: 'connect' }): Promise<Trouble | null> {
   try {
     const loaded = await load();
-    if (message.port.kind === 'serial') await connectSerial(loaded, message.port, message.config);
-    else await connectVirtual(loaded, message.port, message.config);
+    return message.port.kind === 'serial'
+      ? await connectSerial(loaded, message.port, message.config)
+      : await connectVirtual(loaded, message.port, message.config);
   } catch (error) {
-    tell({
-      kind: 'closed',
-      trouble: planner ? (planner.asTrouble(error) ?? portTrouble(error)) : plannerMissing(error),
-    });
-  } finally {
-    opening = undefined;
+    return planner ? (planner.asTrouble(error) ?? portTrouble(error)) : plannerMissing(error);
   }
 }
 
@@ -207,6 +222,10 @@ self.onmessage = ({ data }: MessageEvent<ToMachine>): void => {
       break;
     case 'speed':
       connection?.setSpeed(data.speed);
+      break;
+    case 'watch-speed':
+      watchesSpeed = data.on;
+      if (connection) connection.machine.watchesSpeed = data.on;
       break;
   }
 };

@@ -5,10 +5,12 @@ import { useEffect } from 'preact/hooks';
 import { isPrinting } from '../state/machine';
 import { ConnectDialog } from './connect_dialog';
 import { Console } from './console';
+import { Instruments } from './instruments';
 import { Job } from './job';
 import { MachineDialog } from './machine_dialog';
 import { Motion } from './motion';
 import { dropped } from './open_file';
+import { Asked } from './question';
 import { SettingsDialog } from './settings_dialog';
 import { Temperatures } from './temperatures';
 import { openDialog, TopBar } from './top_bar';
@@ -63,6 +65,7 @@ export function App(): JSX.Element {
           <Temperatures />
           <Motion />
           <Tuning />
+          <Instruments />
           <Console />
         </div>
       </main>
@@ -74,6 +77,7 @@ export function App(): JSX.Element {
       {openDialog.value === 'connect' && <ConnectDialog />}
       {openDialog.value === 'machine' && <MachineDialog />}
       {openDialog.value === 'settings' && <SettingsDialog />}
+      <Asked />
     </>
   );
 }

@@ -1,21 +1,28 @@
 // Choosing what to connect to: a printer on USB, or the virtual printer in this page.
 import { signal } from '@preact/signals';
 import type { JSX } from 'preact';
-import { useEffect } from 'preact/hooks';
+import { useEffect, useId } from 'preact/hooks';
 import { connect, plannerFailed, plannerLoaded, refusePort } from '../state/machine';
 import { activeProfile, profiles, SHIPPED } from '../state/profiles';
 import { change, SPEED_MAX, settings } from '../state/settings';
 import { identify, type PortId } from '../transport/web_serial';
+import { faultProblem } from './faults';
 import { machineSummary } from './machine_summary';
 import { Button, Choice, Dialog, NumberField } from './parts';
 import { openDialog } from './top_bar';
 
 const HAS_SERIAL = 'serial' in navigator;
+const FAULTS_EXAMPLE = 'sensor-open=extruder@90';
+const FAULTS_CHARACTERS_MAX = 500;
+const FAULTS_HINT =
+  'What breaks, and at which second after power-up: sensor-open, sensor-short, heater-dead, heater-stuck-on (=extruder or heater_bed), endstop-stuck-on, endstop-stuck-off (=x, y or z), unplug, replug. Damage to the bytes all the time: corrupt, drop, duplicate, delay (=probability). Several are separated by commas.';
 const SPEEDS = [1, 5, 20, SPEED_MAX] as const;
 
 const known = signal<readonly SerialPort[]>([]);
 const chosen = signal<SerialPort | null>(null);
 const notice = signal<string | null>(null);
+/** A script of what goes wrong with the virtual printer; not kept, so that it surprises nobody another day. */
+const faults = signal('');
 
 const hex = (value: number | null): string => (value ?? 0).toString(16).padStart(4, '0');
 
@@ -53,7 +60,7 @@ function go(): void {
   const { connectTo, baud, speed } = settings.value;
   const { config } = activeProfile.value;
   if (connectTo === 'virtual' || !HAS_SERIAL) {
-    connect({ kind: 'virtual', board: 'rp2040', speed, seed: 1, faults: '' }, config);
+    connect({ kind: 'virtual', board: 'rp2040', speed, seed: 1, faults: faults.value.trim() }, config);
   } else if (chosen.value) {
     connect({ kind: 'serial', id: identify(chosen.value, known.value), baud }, config);
   }
@@ -103,6 +110,8 @@ function Ports(): JSX.Element {
 }
 
 function Virtual(): JSX.Element {
+  const hintId = useId();
+  const problem = faultProblem(faults.value);
   return (
     <div class="stack">
       <p>
@@ -115,6 +124,33 @@ function Virtual(): JSX.Element {
         value={(SPEEDS.find((value) => value === settings.value.speed) ?? 1) as (typeof SPEEDS)[number]}
         onSet={(speed) => change({ speed })}
       />
+      <details class="more">
+        <summary>Try faults out</summary>
+        <div class="stack">
+          <label class="field">
+            Faults
+            <input
+              type="text"
+              class="code"
+              placeholder={FAULTS_EXAMPLE}
+              autocomplete="off"
+              autocapitalize="off"
+              spellcheck={false}
+              maxLength={FAULTS_CHARACTERS_MAX}
+              value={faults.value}
+              aria-invalid={problem !== null}
+              aria-describedby={hintId}
+              onInput={(event) => (faults.value = event.currentTarget.value)}
+            />
+          </label>
+          <p class={problem === null ? 'hint' : 'field-hint'} id={hintId} role="status">
+            {problem ?? FAULTS_HINT}
+          </p>
+        </div>
+      </details>
+      {faults.value.trim() !== '' && problem === null && (
+        <p class="hint">These faults will happen: {faults.value}</p>
+      )}
     </div>
   );
 }
@@ -123,7 +159,8 @@ function obstacle(isSerial: boolean): string | null {
   if (plannerFailed.value) return 'The planner could not be loaded.';
   if (!plannerLoaded.value) return 'The planner is still loading.';
   if (!machineSummary.value) return 'The machine file has errors: mend it under Machine.';
-  return isSerial && !chosen.value ? 'Choose a port first.' : null;
+  if (!isSerial) return faultProblem(faults.value) === null ? null : 'The faults cannot be read: see above.';
+  return chosen.value ? null : 'Choose a port first.';
 }
 
 export function ConnectDialog(): JSX.Element {
@@ -145,6 +182,7 @@ export function ConnectDialog(): JSX.Element {
         {HAS_SERIAL ? (
           <Choice
             label="What to connect to"
+            hideLabel
             choices={[
               { value: 'serial', text: 'Printer on USB' },
               { value: 'virtual', text: 'Virtual printer' },

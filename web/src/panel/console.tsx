@@ -4,24 +4,45 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import { entries } from '../state/log';
 import { gcode, mayMove } from '../state/machine';
 import { Button, Card } from './parts';
+import { notFree } from './reasons';
 
 const HISTORY_MAX = 50;
 const history: string[] = [];
 
-const time = new Intl.DateTimeFormat(undefined, { hour: '2-digit', minute: '2-digit', second: '2-digit' });
+const time = new Intl.DateTimeFormat(undefined, {
+  hour: '2-digit',
+  minute: '2-digit',
+  second: '2-digit',
+  hourCycle: 'h23',
+});
+/** Somebody who is this near the end, in px, reads what comes. */
+const NEAR_END_PX = 24;
 
 function Log(): JSX.Element {
   const ref = useRef<HTMLOListElement>(null);
+  const follows = useRef(true);
+  const lastTop = useRef(0);
   const last = entries.value.at(-1)?.id;
   // Follows what is new, unless the user has scrolled up to read.
   useEffect(() => {
     const list = ref.current;
-    if (last === undefined || !list) return;
-    if (list.scrollHeight - list.scrollTop - list.clientHeight < 80) list.scrollTop = list.scrollHeight;
+    if (last !== undefined && list && follows.current) list.scrollTop = list.scrollHeight;
   }, [last]);
   return (
-    // biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keyboard
-    <ol class="log" ref={ref} tabIndex={0} aria-label="Messages">
+    <ol
+      class="log"
+      ref={ref}
+      // biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keyboard
+      tabIndex={0}
+      aria-label="Messages"
+      onScroll={({ currentTarget: { scrollHeight, scrollTop, clientHeight } }) => {
+        // What comes meanwhile also makes the end farther away: only going up says that somebody reads.
+        if (scrollTop < lastTop.current) follows.current = false;
+        if (scrollHeight - scrollTop - clientHeight < NEAR_END_PX) follows.current = true;
+        lastTop.current = scrollTop;
+      }}
+    >
+      {entries.value.length === 0 && <li class="dim">What happens is noted here.</li>}
       {entries.value.map((entry) => (
         <li key={entry.id} class={entry.kind}>
           <time dateTime={entry.at.toISOString()}>{time.format(entry.at)}</time>
@@ -63,7 +84,8 @@ export function Console(): JSX.Element {
           class="grow code"
           type="text"
           aria-label="G-code to send"
-          placeholder={mayMove.value ? 'G-code, e.g. G28 X' : ''}
+          placeholder={notFree.value ?? 'G-code, e.g. G28 X'}
+          title={notFree.value ?? undefined}
           autocomplete="off"
           autocapitalize="characters"
           spellcheck={false}
@@ -77,7 +99,7 @@ export function Console(): JSX.Element {
             recall(event.key === 'ArrowUp' ? 1 : -1);
           }}
         />
-        <Button disabled={!mayMove.value || text.trim() === ''} onClick={submit}>
+        <Button why={notFree.value} disabled={text.trim() === ''} onClick={submit}>
           Send
         </Button>
       </form>

@@ -1,23 +1,36 @@
 // The file as a print: what it takes, what stands against it, and starting, pausing, ending it.
 import { computed } from '@preact/signals';
-import type { JSX } from 'preact';
-import { connection, isPrinting, isReady, job, outcome, print, snapshot, wish } from '../state/machine';
+import type { ComponentChildren, JSX } from 'preact';
+import type { Summary } from '../preview/protocol';
+import { connection, isPrinting, isReady, job, outcome, snapshot, wish } from '../state/machine';
 import {
   closeFile,
-  confirmed,
   failure,
   file,
-  printedShare,
+  type OpenFile,
+  openFile,
   reading,
   summary,
   unconfirmed,
 } from '../state/preview';
+import {
+  finishesIn,
+  heatingUp,
+  isShown,
+  type PrintedFile,
+  type Progress,
+  printed,
+  printShown,
+  progress,
+} from '../state/print';
 import { Findings } from './findings';
 import { Icon } from './icons';
 import { machineSummary } from './machine_summary';
 import { formatBytes, formatDuration, formatNumber } from './numbers';
 import { pickFile } from './open_file';
 import { Button } from './parts';
+import { ask } from './question';
+import { notReady } from './reasons';
 
 /** Why the file cannot be printed now; null where it can. */
 const obstacle = computed<string | null>(() => {
@@ -27,7 +40,7 @@ const obstacle = computed<string | null>(() => {
   if (summary.value.errors.length > 0) return 'The file cannot be printed on this machine: see below.';
   if (!machineSummary.value) return 'The machine file has errors: mend it under Machine.';
   if (connection.value === 'closed') return 'Connect a printer to print.';
-  if (!isReady.value) return 'The printer is not ready.';
+  if (!isReady.value) return notReady.value;
   const open = unconfirmed.value.length;
   if (open > 0)
     return open === 1
@@ -36,77 +49,114 @@ const obstacle = computed<string | null>(() => {
   return null;
 });
 
-function start(): void {
-  const open = file.value;
-  if (open && obstacle.value === null) void print(open.blob, [...confirmed.value]);
-}
-
 function cancel(): void {
-  if (window.confirm('End the print? It cannot be continued.')) void wish({ kind: 'cancel' });
+  ask({
+    title: 'End the print?',
+    text: 'It cannot be continued. The heaters are switched off.',
+    yes: 'End the print',
+    no: 'Go on printing',
+    act: () => void wish({ kind: 'cancel' }),
+  });
 }
 
-function Facts(): JSX.Element | null {
-  const facts = summary.value;
-  if (!facts) return null;
+interface FactProps {
+  readonly name: string;
+  readonly children: ComponentChildren;
+}
+
+function Fact({ name, children }: FactProps): JSX.Element {
+  return (
+    <div>
+      <dt>{name}</dt>
+      <dd>{children}</dd>
+    </div>
+  );
+}
+
+const metres = (length: number): string => formatNumber(length / 1000, 2);
+
+/** What the file that is shown takes. */
+function Plan({ plan }: { readonly plan: Summary }): JSX.Element {
   return (
     <dl class="facts">
-      {facts.time !== null && (
-        <div>
-          <dt>Print time</dt>
-          <dd>{formatDuration(facts.time)}</dd>
-        </div>
-      )}
-      <div>
-        <dt>Filament</dt>
-        <dd>{formatNumber(facts.filament / 1000, 2)} m</dd>
-      </div>
-      <div>
-        <dt>Layers</dt>
-        <dd>{formatNumber(facts.layers.length)}</dd>
-      </div>
+      <Fact name="Print time">{plan.time === null ? '–' : formatDuration(plan.time)}</Fact>
+      <Fact name="Filament">{metres(plan.filament)} m</Fact>
+      <Fact name="Layers">{formatNumber(plan.layers.length)}</Fact>
+      <Fact name="Height">{formatNumber(plan.bounds?.max[2] ?? 0, 2)} mm</Fact>
     </dl>
   );
 }
 
-function Progress(): JSX.Element | null {
+const clock = new Intl.DateTimeFormat(undefined, { hour: 'numeric', minute: '2-digit' });
+const clockWithDay = new Intl.DateTimeFormat(undefined, {
+  weekday: 'short',
+  hour: 'numeric',
+  minute: '2-digit',
+});
+
+/** The time of day, in so many seconds; with the day where that is another. */
+function timeIn(left: number): string {
+  const [now, then] = [new Date(), new Date(Date.now() + left * 1000)];
+  return (now.getDate() === then.getDate() && left < 86_400 ? clock : clockWithDay).format(then);
+}
+
+/** How far the print is. */
+function Running({ far, filament }: { readonly far: Progress; readonly filament: number }): JSX.Element {
   const now = snapshot.value;
-  if (!now || !isPrinting.value) return null;
-  const done = printedShare(now);
-  const total = summary.value?.time ?? null;
-  // The plan is for the speed as written; what is left goes at the speed that is set.
-  const left = total === null ? null : Math.max(0, total - now.elapsed) / Math.max(0.1, now.speedFactor);
+  const ends = finishesIn.value;
+  const z = now?.homed[2] ? now.position?.[2] : undefined;
   return (
-    <div class="progress">
-      <div class="progress-line">
-        <span class="percent">{formatNumber(done * 100, 0)} %</span>
-        <span>
-          <span class="dim">Elapsed</span> {formatDuration(now.elapsed)}
-        </span>
-        {left !== null && (
-          <span>
-            <span class="dim">Remaining</span> {formatDuration(left)}
-          </span>
-        )}
-        <span>
-          <span class="dim">Line</span> {formatNumber(now.line)}
-        </span>
-        {now.queued !== null && (
-          <span>
-            <span class="dim">Queued on the board</span> {formatNumber(now.queued, 1)} s
-          </span>
-        )}
-      </div>
-      <progress max={1} value={done} aria-label="Print progress" />
-    </div>
+    <dl class="facts">
+      <Fact name="Done">
+        <span class="percent">{formatNumber(Math.floor(far.share * 100))} %</span>
+      </Fact>
+      <Fact name="Remaining">{far.left === null ? '–' : formatDuration(far.left)}</Fact>
+      <Fact name="Finished at">{ends === null || job.value !== 'printing' ? '–' : timeIn(ends)}</Fact>
+      <Fact name="Elapsed">{formatDuration(far.elapsed)}</Fact>
+      <Fact name="Layer">
+        {formatNumber(far.layer)} of {formatNumber(far.layers)}
+      </Fact>
+      <Fact name="Height">{z === undefined ? '–' : `${formatNumber(z, 2)} mm`}</Fact>
+      <Fact name="Filament">
+        {metres(far.filament ?? 0)} of {metres(filament)} m
+      </Fact>
+      <Fact name="Line">{formatNumber(far.line)}</Fact>
+      <Fact name="Queued on the board">{now?.queued == null ? '–' : `${formatNumber(now.queued, 1)} s`}</Fact>
+    </dl>
   );
+}
+
+const HEATERS = { extruder: 'nozzle', heater_bed: 'bed' } as const;
+
+/** What the print is waiting for, in words. */
+function waiting(): string | null {
+  if (job.value === 'paused')
+    return 'Paused. The heaters stay on; the head can be moved by hand and goes back.';
+  const heater = heatingUp.value;
+  if (heater) {
+    const [now, target] = [heater.temperature, heater.target].map((value) => formatNumber(value));
+    return `Heating the ${HEATERS[heater.name]}: ${now} of ${target}\u00a0°C.`;
+  }
+  return job.value === 'printing' && snapshot.value?.queued === null && snapshot.value.elapsed === 0
+    ? 'Getting ready.'
+    : null;
 }
 
 function Actions(): JSX.Element {
   const state = job.value;
   if (state === 'none') {
+    const again = outcome.value !== null && isShown.value;
     return (
-      <Button kind="primary" icon="play" class="big" disabled={obstacle.value !== null} onClick={start}>
-        Print
+      <Button
+        kind="primary"
+        icon="play"
+        class="big"
+        why={obstacle.value}
+        onClick={() => {
+          if (obstacle.value === null) void printShown();
+        }}
+      >
+        {again ? 'Print again' : 'Print'}
       </Button>
     );
   }
@@ -123,7 +173,7 @@ function Actions(): JSX.Element {
         </Button>
       )}
       <Button kind="danger" class="big" disabled={state === 'ending'} onClick={cancel}>
-        Cancel
+        {state === 'ending' ? 'Ending' : 'Cancel'}
       </Button>
     </>
   );
@@ -149,40 +199,74 @@ function Outcome(): JSX.Element {
   );
 }
 
-export function Job(): JSX.Element | null {
+/** The file of the card: the one that is printed, else the one that is shown. */
+function Head({
+  open,
+  generator,
+}: {
+  readonly open: OpenFile;
+  readonly generator: string | null;
+}): JSX.Element {
+  return (
+    <div class="job-head">
+      <span class="job-icon">
+        <Icon name="file" />
+      </span>
+      <div class="job-name">
+        <h2 title={open.name}>{open.name}</h2>
+        <p class="dim">
+          {formatBytes(open.blob.size)}
+          {generator ? `, ${generator}` : ''}
+        </p>
+      </div>
+      {isPrinting.value ? (
+        <Button onClick={pickFile}>Look at another file</Button>
+      ) : (
+        <span class="row">
+          <Button onClick={pickFile}>Other file</Button>
+          <Button icon="close" kind="quiet" label="Close the file" onClick={closeFile} />
+        </span>
+      )}
+    </div>
+  );
+}
+
+/** Another file is looked at while one is printed. */
+function Visitor({ job }: { readonly job: PrintedFile }): JSX.Element | null {
   const open = file.value;
+  if (isShown.value) return null;
+  return (
+    <p class="row wrap visitor">
+      <span class="grow">
+        {open
+          ? `In view: ${open.name}. It is not what is being printed.`
+          : 'The printed file is not in view.'}
+      </span>
+      <Button onClick={() => openFile(job.file.blob, job.file.name)}>Show the print</Button>
+    </p>
+  );
+}
+
+export function Job(): JSX.Element | null {
+  const running = isPrinting.value ? printed.value : null;
+  const open = running?.file ?? file.value;
+  const far = progress.value;
+  const plan = summary.value;
   if (!open && !isPrinting.value && !outcome.value) return null;
-  const why = obstacle.value;
+  const hint = isPrinting.value ? waiting() : obstacle.value;
   return (
     <section class="card job" aria-label="Print">
-      {open ? (
-        <div class="job-head">
-          <span class="job-icon">
-            <Icon name="file" />
-          </span>
-          <div class="job-name">
-            <h2>{open.name}</h2>
-            <p class="dim">
-              {formatBytes(open.blob.size)}
-              {summary.value?.generator ? `, ${summary.value.generator}` : ''}
-            </p>
-          </div>
-          {!isPrinting.value && (
-            <span class="row">
-              <Button onClick={pickFile}>Other file</Button>
-              <Button icon="close" kind="quiet" label="Close the file" onClick={closeFile} />
-            </span>
-          )}
-        </div>
-      ) : null}
-      <Facts />
-      <Progress />
+      {open && <Head open={open} generator={(running?.summary ?? plan)?.generator ?? null} />}
+      {running && far && <Running far={far} filament={running.summary.filament} />}
+      {!isPrinting.value && plan && <Plan plan={plan} />}
+      {far && <progress max={1} value={far.share} aria-label="Print progress" />}
       {(open || isPrinting.value) && (
         <div class="row wrap job-actions">
           <Actions />
-          {why && !isPrinting.value && <p class="hint">{why}</p>}
+          {hint && <p class="hint grow">{hint}</p>}
         </div>
       )}
+      {running && <Visitor job={running} />}
       <Outcome />
       <Findings />
     </section>

@@ -1,13 +1,15 @@
 // The machine's file: profiles, editing, what is wrong by line, taking files in and giving them out.
-import { useSignal } from '@preact/signals';
+import { computed, signal, useSignal } from '@preact/signals';
 import type { JSX } from 'preact';
-import { useEffect, useId } from 'preact/hooks';
+import { useEffect, useId, useLayoutEffect } from 'preact/hooks';
 import type { ConfigReport, Remark } from '../preview/protocol';
 import { connection } from '../state/machine';
 import { checkConfig } from '../state/preview';
 import {
   activeProfile,
   CONFIG_CHARACTERS_MAX,
+  importNotice,
+  importProfile,
   newProfileId,
   type Profile,
   profiles,
@@ -17,8 +19,9 @@ import {
   saveProfile,
 } from '../state/profiles';
 import { change } from '../state/settings';
+import { PanelDialog } from './emergency';
 import { formatNumber } from './numbers';
-import { Button, Dialog, download } from './parts';
+import { Button, download } from './parts';
 import { openDialog } from './top_bar';
 
 /** The text is checked when nothing has been typed for so long, in ms. */
@@ -70,30 +73,39 @@ function Verdict({ report }: { readonly report: ConfigReport | null }): JSX.Elem
   return <p class="verdict good">A machine with room for {room} mm.</p>;
 }
 
-function ProfileRow({
-  profile,
-  onChange,
-}: {
+interface ProfileRowProps {
   readonly profile: Profile;
-  readonly onChange: (id: string) => void;
-}): JSX.Element {
-  const create = (name: string, config: string): void => {
-    const id = newProfileId();
-    void saveProfile({ id, name, config });
-    onChange(id);
-  };
-  const take = async (file: File | undefined): Promise<void> => {
-    if (!file || file.size > CONFIG_CHARACTERS_MAX) return;
-    create(file.name.replace(/\.cfg$/i, '').slice(0, 60) || 'Machine', await file.text());
-  };
+  readonly isBusy: boolean;
+  /** Whether the text on the screen may be put away. */
+  readonly mayLeave: () => boolean;
+}
+
+function ProfileRow({ profile, isBusy, mayLeave }: ProfileRowProps): JSX.Element {
   const isShipped = profile.id === SHIPPED.id;
   const isChanged = !isShipped || profile.config !== SHIPPED.config || profile.name !== SHIPPED.name;
   const question = isShipped ? 'Put the shipped file back?' : `Delete the profile “${profile.name}”?`;
+  const duplicate = (): void => {
+    if (!mayLeave()) return;
+    void saveProfile({ ...profile, id: newProfileId(), name: `${profile.name} copy`.slice(0, 60) });
+  };
+  const take = (input: HTMLInputElement): void => {
+    const file = input.files?.[0];
+    if (file && mayLeave()) void importProfile(file);
+    // The same file may be picked again after it was changed.
+    input.value = '';
+  };
   return (
-    <div class="row wrap end">
+    <fieldset class="row wrap end" disabled={isBusy}>
+      <legend class="unseen">Profiles</legend>
       <label class="field grow">
         Profile
-        <select value={profile.id} onChange={(event) => onChange(event.currentTarget.value)}>
+        <select
+          value={profile.id}
+          onChange={({ currentTarget }) => {
+            if (mayLeave()) change({ profile: currentTarget.value });
+            else currentTarget.value = profile.id;
+          }}
+        >
           {profiles.value.map(({ id, name }) => (
             <option key={id} value={id}>
               {name}
@@ -101,13 +113,13 @@ function ProfileRow({
           ))}
         </select>
       </label>
-      <Button onClick={() => create(`${profile.name} copy`.slice(0, 60), profile.config)}>Duplicate</Button>
+      <Button onClick={duplicate}>Duplicate</Button>
       <label class="button plain file-button">
         <input
           type="file"
           accept=".cfg,.txt,.conf"
           class="unseen"
-          onChange={(event) => void take(event.currentTarget.files?.[0])}
+          onChange={(event) => take(event.currentTarget)}
         />
         <span>Open printer.cfg</span>
       </label>
@@ -117,39 +129,48 @@ function ProfileRow({
       >
         {isShipped ? 'Put back' : 'Delete'}
       </Button>
-    </div>
+    </fieldset>
   );
 }
+
+/** A profile's name and text as they stand on the screen. */
+const draft = signal<Pick<Profile, 'name' | 'config'>>(SHIPPED);
+const isDraftChanged = computed(
+  () => draft.value.config !== activeProfile.value.config || draft.value.name !== activeProfile.value.name,
+);
 
 export function MachineDialog(): JSX.Element {
   const profile = activeProfile.value;
   const isBusy = connection.value !== 'closed';
+  // Only without a connection: the browser's own question stops the page.
+  const mayLeave = (): boolean =>
+    isBusy || !isDraftChanged.value || window.confirm('Leave without saving what you changed?');
+  const close = (): void => {
+    importNotice.value = null;
+    openDialog.value = null;
+  };
   return (
-    <Dialog title="Machine" wide onClose={() => (openDialog.value = null)}>
+    <PanelDialog title="Machine" wide onClose={close} mayClose={mayLeave}>
       <div class="stack">
         {isBusy && <p class="hint">Disconnect to change the machine: the board was set up from this file.</p>}
-        <fieldset class="bare stack" disabled={isBusy}>
-          <ProfileRow profile={profile} onChange={(id) => change({ profile: id })} />
-          <Editor key={profile.id + profile.config.length} profile={profile} />
-        </fieldset>
+        <ProfileRow profile={profile} isBusy={isBusy} mayLeave={mayLeave} />
+        <div role="status">{importNotice.value && <p class="hint">{importNotice.value}</p>}</div>
+        <Editor key={profile.id} profile={profile} isBusy={isBusy} />
         {!profilesAreKept.value && (
           <p class="hint">This browser keeps nothing for this page: download what you change.</p>
         )}
       </div>
-    </Dialog>
+    </PanelDialog>
   );
 }
 
-function Editor({ profile }: { readonly profile: Profile }): JSX.Element {
-  const areaId = useId();
-  const name = useSignal(profile.name);
-  const text = useSignal(profile.config);
+/** What the planner says to a text, a moment after it was last changed. */
+function useReport(text: string): ConfigReport | null {
   const report = useSignal<ConfigReport | null>(null);
-  const draft = text.value;
   useEffect(() => {
     let isCurrent = true;
     const timer = setTimeout(() => {
-      void checkConfig(draft).then((found) => {
+      void checkConfig(text).then((found) => {
         if (isCurrent) report.value = found;
       });
     }, CHECK_DELAY_MS);
@@ -157,10 +178,27 @@ function Editor({ profile }: { readonly profile: Profile }): JSX.Element {
       isCurrent = false;
       clearTimeout(timer);
     };
-  }, [draft]);
-  const isChanged = draft !== profile.config || name.value.trim() !== profile.name;
-  const save = (): void =>
-    void saveProfile({ ...profile, name: name.value.trim() || profile.name, config: draft });
+  }, [text]);
+  return report.value;
+}
+
+function Editor({ profile, isBusy }: { readonly profile: Profile; readonly isBusy: boolean }): JSX.Element {
+  const areaId = useId();
+  const isSaved = useSignal(false);
+  // What was put back or read anew replaces what stands here; what was saved from here is the same.
+  useLayoutEffect(() => {
+    draft.value = { name: profile.name, config: profile.config };
+  }, [profile.name, profile.config]);
+  const { name, config } = draft.value;
+  const report = useReport(config);
+  const edit = (changes: Partial<Profile>): void => {
+    isSaved.value = false;
+    draft.value = { ...draft.value, ...changes };
+  };
+  const save = (): void => {
+    isSaved.value = true;
+    void saveProfile({ ...profile, name: name.trim() || profile.name, config });
+  };
   return (
     <div class="stack">
       <label class="field">
@@ -168,8 +206,9 @@ function Editor({ profile }: { readonly profile: Profile }): JSX.Element {
         <input
           type="text"
           maxLength={60}
-          value={name.value}
-          onInput={(event) => (name.value = event.currentTarget.value)}
+          value={name}
+          disabled={isBusy}
+          onInput={(event) => edit({ name: event.currentTarget.value })}
         />
       </label>
       <label class="field" for={areaId}>
@@ -181,20 +220,22 @@ function Editor({ profile }: { readonly profile: Profile }): JSX.Element {
         spellcheck={false}
         maxLength={CONFIG_CHARACTERS_MAX}
         wrap="off"
-        value={draft}
-        onInput={(event) => (text.value = event.currentTarget.value)}
+        value={config}
+        readOnly={isBusy}
+        onInput={(event) => edit({ config: event.currentTarget.value })}
       />
       <div role="status">
-        <Verdict report={report.value} />
+        <Verdict report={report} />
       </div>
-      {report.value && report.value.remarks.length > 0 && (
-        <RemarkList remarks={report.value.remarks} area={areaId} />
-      )}
-      <div class="dialog-foot">
-        <Button icon="download" onClick={() => download(draft, `${name.value.trim() || 'printer'}.cfg`)}>
+      {report && report.remarks.length > 0 && <RemarkList remarks={report.remarks} area={areaId} />}
+      <div class="dialog-foot sticky">
+        <span role="status" class="hint">
+          {isSaved.value && !isDraftChanged.value ? 'Saved.' : ''}
+        </span>
+        <Button icon="download" onClick={() => download(config, `${name.trim() || 'printer'}.cfg`)}>
           Download
         </Button>
-        <Button kind="primary" class="big" disabled={!isChanged} onClick={save}>
+        <Button kind="primary" class="big" disabled={isBusy || !isDraftChanged.value} onClick={save}>
           Save
         </Button>
       </div>

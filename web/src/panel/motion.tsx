@@ -1,12 +1,13 @@
 // Moving by hand: position, home, jog, extrude, motors off.
 import type { JSX } from 'preact';
 import type { Axis } from '../machine/protocol';
-import { isReady, isShutdown, mayMove, snapshot, wish } from '../state/machine';
-import { change, JOG_STEPS, settings } from '../state/settings';
+import { isReady, snapshot, wish } from '../state/machine';
+import { change, EXTRUDE_MAX_MM, EXTRUDE_SPEED_MAX_MM_S, JOG_STEPS, settings } from '../state/settings';
 import { mm } from '../units';
 import { machineSummary } from './machine_summary';
 import { formatNumber } from './numbers';
 import { Button, Card, Choice, NumberField } from './parts';
+import { notFree } from './reasons';
 
 const AXES = ['X', 'Y', 'Z'] as const;
 
@@ -23,8 +24,6 @@ function jog(axis: Axis, step: number): void {
   if (Math.abs(way) < 1e-4) return;
   void wish({ kind: 'jog', axis, distance: mm(way) });
 }
-
-const extrude = (length: number): void => void wish({ kind: 'extrude', length: mm(length) });
 
 function Position(): JSX.Element | null {
   if (!isReady.value) return null;
@@ -50,7 +49,7 @@ function Position(): JSX.Element | null {
   );
 }
 
-function JogPad(): JSX.Element {
+function JogPad({ why }: { readonly why: string | null }): JSX.Element {
   const step = settings.value.jogStep;
   const homed = snapshot.value?.homed ?? [false, false, false];
   const button = (
@@ -64,7 +63,7 @@ function JogPad(): JSX.Element {
       icon={icon}
       class={`jog ${at}`}
       label={`${words} ${formatNumber(step, 1, 0)} mm`}
-      disabled={!mayMove.value || !homed[AXES.indexOf(axis)]}
+      why={homed[AXES.indexOf(axis)] ? notFree.value : why}
       onClick={() => jog(axis, sign * step)}
     />
   );
@@ -78,7 +77,7 @@ function JogPad(): JSX.Element {
           icon="home"
           class="jog centre"
           label="Home all axes"
-          disabled={!mayMove.value}
+          why={notFree.value}
           onClick={() => void wish({ kind: 'home', axes: [] })}
         />
         {button('X', 1, 'right', 'Right', 'east')}
@@ -97,58 +96,99 @@ function JogPad(): JSX.Element {
 }
 
 function reason(): string | null {
-  if (isShutdown.value) return 'The board has stopped: restart it first.';
-  if (!isReady.value) return 'Connect a printer to move it.';
-  if (!mayMove.value) return 'While a print runs, the print moves the head. Pause it to move by hand.';
+  if (notFree.value) return notFree.value;
   if (!(snapshot.value?.homed ?? []).every(Boolean))
     return 'Home first: until then the position is not known.';
   return null;
 }
 
+/** Why no filament can be pushed. */
+function coldReason(): string | null {
+  if (notFree.value) return notFree.value;
+  const min = machineSummary.value?.heaters.find(({ name }) => name === 'extruder')?.extrudeMin ?? null;
+  const now = snapshot.value?.heaters.find(({ name }) => name === 'extruder')?.temperature;
+  if (min === null || now === undefined || now >= min) return null;
+  return `The nozzle is too cold to push filament: ${formatNumber(now)}\u00a0°C, at least ${formatNumber(min)}\u00a0°C are needed.`;
+}
+
+function Filament(): JSX.Element {
+  const { extrudeLength, extrudeSpeed } = settings.value;
+  const machine = machineSummary.value;
+  const lengthMax = Math.min(EXTRUDE_MAX_MM, machine?.extrudeMax ?? EXTRUDE_MAX_MM);
+  const speedMax = Math.min(EXTRUDE_SPEED_MAX_MM_S, machine?.extrudeSpeedMax ?? EXTRUDE_SPEED_MAX_MM_S);
+  const why = coldReason();
+  const push = (direction: 1 | -1): void =>
+    void wish({
+      kind: 'extrude',
+      length: mm(direction * Math.min(extrudeLength, lengthMax)),
+      speed: Math.min(extrudeSpeed, speedMax),
+    });
+  return (
+    <fieldset class="stack">
+      <legend class="unseen">Filament</legend>
+      <div class="row wrap end filament">
+        <NumberField
+          label="Filament"
+          unit="mm"
+          value={Math.min(extrudeLength, lengthMax)}
+          min={0.1}
+          max={lengthMax}
+          decimals={1}
+          onSet={(value) => change({ extrudeLength: value })}
+        />
+        <NumberField
+          label="Feed rate"
+          unit="mm/s"
+          value={Math.min(extrudeSpeed, speedMax)}
+          min={0.1}
+          max={speedMax}
+          decimals={1}
+          onSet={(value) => change({ extrudeSpeed: value })}
+        />
+        <Button why={why} onClick={() => push(1)}>
+          Extrude
+        </Button>
+        <Button why={why} onClick={() => push(-1)}>
+          Retract
+        </Button>
+      </div>
+      {why && why !== notFree.value && <p class="hint">{why}</p>}
+    </fieldset>
+  );
+}
+
 export function Motion(): JSX.Element {
-  const { jogStep, extrudeLength } = settings.value;
   const why = reason();
   return (
     <Card title="Motion" aside={<Position />}>
       <Choice
         label="Step size"
+        hideLabel
         choices={JOG_STEPS.map((value) => ({ value, text: `${formatNumber(value, 1, 0)} mm` }))}
-        value={jogStep as (typeof JOG_STEPS)[number]}
+        value={settings.value.jogStep as (typeof JOG_STEPS)[number]}
         onSet={(value) => change({ jogStep: value })}
       />
-      <JogPad />
-      {why && <p class="hint">{why}</p>}
-      <div class="row wrap end">
-        <NumberField
-          label="Filament"
-          unit="mm"
-          value={extrudeLength}
-          min={0.1}
-          max={100}
-          decimals={1}
-          onSet={(value) => change({ extrudeLength: value })}
-        />
-        <Button disabled={!mayMove.value} onClick={() => extrude(extrudeLength)}>
-          Extrude
-        </Button>
-        <Button disabled={!mayMove.value} onClick={() => extrude(-extrudeLength)}>
-          Retract
-        </Button>
-      </div>
-      <div class="row wrap">
+      <JogPad why={why} />
+      <div class="row homing">
+        <span class="dim" aria-hidden="true">
+          Home
+        </span>
         {AXES.map((axis) => (
           <Button
             key={axis}
-            disabled={!mayMove.value}
+            label={`Home ${axis}`}
+            why={notFree.value}
             onClick={() => void wish({ kind: 'home', axes: [axis] })}
           >
-            Home {axis}
+            {axis}
           </Button>
         ))}
-        <Button disabled={!mayMove.value} onClick={() => void wish({ kind: 'motors-off' })}>
+        <Button class="last" why={notFree.value} onClick={() => void wish({ kind: 'motors-off' })}>
           Motors off
         </Button>
       </div>
+      {why && <p class="hint">{why}</p>}
+      <Filament />
     </Card>
   );
 }

@@ -18,6 +18,12 @@ export function formatNumber(value: number, decimals = 0, minimum = decimals): s
   return format.format(rounded === 0 ? 0 : rounded);
 }
 
+/** The decimal sign of the user's language. */
+export function decimalSign(): string {
+  const parts = new Intl.NumberFormat().formatToParts(0.5);
+  return parts.find(({ type }) => type === 'decimal')?.value ?? '.';
+}
+
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)$/;
 
 /**

@@ -1,9 +1,14 @@
-// Taking files that are dropped or picked. What is in them is judged by the planner, not by their names.
+// Taking files that are dropped or picked. What is in them is judged by the planner, not by their names; but a
+// machine's file goes by its name.
 
 import sampleUrl from '../../../samples/test-part.gcode?url';
+import { connection } from '../state/machine';
 import { openFile } from '../state/preview';
+import { importProfile } from '../state/profiles';
+import { openDialog } from './top_bar';
 
 export const ACCEPTED = '.gcode,.gco,.g,.gz,.nc,.txt,text/x.gcode';
+const MACHINE_FILE = /\.(cfg|conf)$/i;
 
 /** Lets the user pick a file. */
 export function pickFile(): void {
@@ -23,8 +28,12 @@ export async function openSample(): Promise<void> {
   if (response.ok) openFile(await response.blob(), 'test-part.gcode');
 }
 
-/** The first file of a drop. */
+/** The first file of a drop: a print, or a machine, which becomes a profile of its own. */
 export function dropped(data: DataTransfer | null): void {
   const file = data?.files[0];
-  if (file) openFile(file, file.name);
+  if (!file) return;
+  if (!MACHINE_FILE.test(file.name)) return openFile(file, file.name);
+  // The machine that is connected stays the one in use.
+  void importProfile(file, connection.value === 'closed');
+  openDialog.value = 'machine';
 }

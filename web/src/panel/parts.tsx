@@ -31,6 +31,8 @@ interface ButtonProps {
   readonly kind?: 'plain' | 'primary' | 'danger' | 'quiet';
   readonly label?: string;
   readonly disabled?: boolean;
+  /** Why the button cannot be used now; null where it can. */
+  readonly why?: string | null;
   readonly pressed?: boolean;
   readonly class?: string;
 }
@@ -43,6 +45,7 @@ export function Button({
   kind = 'plain',
   label,
   disabled,
+  why,
   pressed,
   class: more = '',
 }: ButtonProps): JSX.Element {
@@ -51,10 +54,10 @@ export function Button({
       type="button"
       class={`button ${kind} ${children ? '' : 'only-icon'} ${more}`}
       onClick={onClick}
-      disabled={disabled ?? false}
+      disabled={disabled || Boolean(why)}
       aria-label={label}
       aria-pressed={pressed}
-      title={label}
+      title={why ?? (children ? undefined : label)}
     >
       {icon && <Icon name={icon} />}
       {children && <span>{children}</span>}
@@ -70,6 +73,8 @@ interface NumberFieldProps {
   readonly max: number;
   readonly decimals?: number;
   readonly disabled?: boolean;
+  /** Why the field cannot be used now; null where it can. */
+  readonly why?: string | null;
   readonly hideLabel?: boolean;
   /** Called with a number between `min` and `max`, on Enter and on leaving the field after a change. */
   readonly onSet: (value: number) => void;
@@ -77,12 +82,12 @@ interface NumberFieldProps {
 
 /** A number to type, with its unit; what is no number, or out of range, is said and not passed on. */
 export function NumberField(props: NumberFieldProps): JSX.Element {
-  const { label, unit, value, min, max, decimals = 0, disabled, hideLabel, onSet } = props;
+  const { label, unit, value, min, max, decimals = 0, disabled, why, hideLabel, onSet } = props;
   const id = useId();
   const [draft, setDraft] = useState<string | null>(null);
   const number = draft === null ? value : parseNumber(draft);
   const isWrong = number === undefined || number < min || number > max;
-  const hint = `From ${formatNumber(min)} to ${formatNumber(max)} ${unit}`;
+  const hint = `From ${formatNumber(min, decimals, 0)} to ${formatNumber(max, decimals, 0)} ${unit}`;
   const commit = (): void => {
     if (draft === null || isWrong) return;
     setDraft(null);
@@ -100,7 +105,8 @@ export function NumberField(props: NumberFieldProps): JSX.Element {
           inputMode="decimal"
           autocomplete="off"
           value={draft ?? formatNumber(value, decimals, 0)}
-          disabled={disabled}
+          disabled={disabled || Boolean(why)}
+          title={why ?? undefined}
           aria-invalid={isWrong}
           aria-describedby={isWrong ? `${id}-hint` : undefined}
           onFocus={(event) => event.currentTarget.select()}
@@ -132,15 +138,19 @@ export function NumberField(props: NumberFieldProps): JSX.Element {
   );
 }
 
-interface DialogProps {
+export interface DialogProps {
   readonly title: string;
   readonly onClose: () => void;
   readonly children: ComponentChildren;
   readonly wide?: boolean;
+  /** In the head, before the cross. */
+  readonly aside?: ComponentChildren;
+  /** Asked before Escape and the cross close the dialog. */
+  readonly mayClose?: () => boolean;
 }
 
-/** A modal dialog; Escape and the cross close it. */
-export function Dialog({ title, onClose, children, wide }: DialogProps): JSX.Element {
+/** A modal dialog; Escape and the cross close it, and the focus goes back to where it was. */
+export function Dialog({ title, onClose, children, wide, aside, mayClose }: DialogProps): JSX.Element {
   const ref = useRef<HTMLDialogElement>(null);
   const id = useId();
   useEffect(() => {
@@ -148,11 +158,19 @@ export function Dialog({ title, onClose, children, wide }: DialogProps): JSX.Ele
     dialog?.showModal();
     return () => dialog?.close();
   }, []);
+  const isFree = (): boolean => mayClose?.() ?? true;
   return (
-    <dialog ref={ref} class={wide ? 'wide' : ''} aria-labelledby={id} onClose={onClose}>
+    <dialog
+      ref={ref}
+      class={wide ? 'wide' : ''}
+      aria-labelledby={id}
+      onClose={onClose}
+      onCancel={(event) => !isFree() && event.preventDefault()}
+    >
       <header class="dialog-head">
         <h2 id={id}>{title}</h2>
-        <Button icon="close" label="Close" kind="quiet" onClick={onClose} />
+        {aside}
+        <Button icon="close" label="Close" kind="quiet" onClick={() => isFree() && onClose()} />
       </header>
       <div class="dialog-body">{children}</div>
     </dialog>
@@ -165,6 +183,8 @@ interface ChoiceProps<T extends string | number> {
   readonly value: T;
   readonly onSet: (value: T) => void;
   readonly disabled?: boolean;
+  /** The label is for screen readers alone, where the choices speak for themselves. */
+  readonly hideLabel?: boolean;
 }
 
 /** A few choices side by side, of which one holds. */
@@ -174,23 +194,26 @@ export function Choice<T extends string | number>({
   value,
   onSet,
   disabled,
+  hideLabel,
 }: ChoiceProps<T>): JSX.Element {
   const name = useId();
   return (
-    <fieldset class="choice" disabled={disabled}>
-      <legend class="unseen">{label}</legend>
-      {choices.map((choice) => (
-        <label key={choice.value} class={choice.value === value ? 'chosen' : ''}>
-          <input
-            type="radio"
-            name={name}
-            class="unseen"
-            checked={choice.value === value}
-            onChange={() => onSet(choice.value)}
-          />
-          {choice.text}
-        </label>
-      ))}
+    <fieldset class="choice-field" disabled={disabled}>
+      <legend class={hideLabel ? 'unseen' : ''}>{label}</legend>
+      <div class="choice">
+        {choices.map((choice) => (
+          <label key={choice.value} class={choice.value === value ? 'chosen' : ''}>
+            <input
+              type="radio"
+              name={name}
+              class="unseen"
+              checked={choice.value === value}
+              onChange={() => onSet(choice.value)}
+            />
+            {choice.text}
+          </label>
+        ))}
+      </div>
     </fieldset>
   );
 }

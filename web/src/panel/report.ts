@@ -1,8 +1,16 @@
 // The diagnostic report: everything that somebody who helps would ask for, as text.
+import { effect } from '@preact/signals';
+import type { Snapshot } from '../machine/protocol';
 import { entries } from '../state/log';
-import { connection, firmware, port, snapshot, trouble } from '../state/machine';
+import { connection, firmware, port, snapshot, trouble, virtualRecord } from '../state/machine';
 import { file, summary } from '../state/preview';
 import { activeProfile } from '../state/profiles';
+
+/** The machine when it was last seen: after a connection that broke, that is what one wants to know. */
+let last: Snapshot | null = null;
+effect(() => {
+  last = snapshot.value ?? last;
+});
 
 const section = (title: string, content: unknown): string =>
   `== ${title}\n${typeof content === 'string' ? content : JSON.stringify(content, null, 2)}\n`;
@@ -29,7 +37,8 @@ export function diagnosticReport(): string {
       firmware: firmware.value,
       trouble: trouble.value,
     }),
-    section('Machine now', snapshot.value),
+    section(snapshot.value ? 'Machine now' : 'Machine when last seen', last),
+    section("Virtual printer's own record", virtualRecord.value),
     section('File', job),
     section('Messages', log.join('\n')),
     section(`printer.cfg (${activeProfile.value.name})`, activeProfile.value.config),

@@ -1,7 +1,8 @@
 // Settings: theme, presets for materials, the diagnostic report.
 import type { JSX } from 'preact';
 import { change, PRESETS_MAX, type Preset, settings, type Theme } from '../state/settings';
-import { Button, Choice, Dialog, download, NumberField } from './parts';
+import { PanelDialog } from './emergency';
+import { Button, Choice, download, NumberField } from './parts';
 import { diagnosticReport } from './report';
 import { openDialog } from './top_bar';
 
@@ -57,10 +58,16 @@ export function SettingsDialog(): JSX.Element {
     { value: 'dark', text: 'Dark' },
   ];
   return (
-    <Dialog title="Settings" onClose={() => (openDialog.value = null)}>
+    <PanelDialog title="Settings" onClose={() => (openDialog.value = null)}>
       <div class="stack">
         <h3>Theme</h3>
-        <Choice label="Theme" choices={themes} value={theme} onSet={(value) => change({ theme: value })} />
+        <Choice
+          label="Theme"
+          hideLabel
+          choices={themes}
+          value={theme}
+          onSet={(value) => change({ theme: value })}
+        />
         <h3>Temperature presets</h3>
         <ul class="presets">
           {presets.map((preset, index) => (
@@ -86,6 +93,6 @@ export function SettingsDialog(): JSX.Element {
           </Button>
         </div>
       </div>
-    </Dialog>
+    </PanelDialog>
   );
 }

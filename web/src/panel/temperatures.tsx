@@ -2,11 +2,13 @@
 import type { JSX } from 'preact';
 import type { HeaterName, HeaterState } from '../machine/protocol';
 import { isReady, snapshot, wish } from '../state/machine';
+import { HEATING_BELOW_K } from '../state/print';
 import { type Preset, settings } from '../state/settings';
 import { celsius } from '../units';
 import { machineSummary } from './machine_summary';
 import { formatNumber } from './numbers';
 import { Button, Card, NumberField } from './parts';
+import { notReady } from './reasons';
 
 const NAMES: Record<HeaterName, string> = { extruder: 'Nozzle', heater_bed: 'Bed' };
 /** Where the machine's file sets no limit that is known here; the planner refuses what it forbids. */
@@ -24,62 +26,81 @@ function apply(preset: Preset): void {
 }
 
 /** What the heater does. Without a board that answers nothing is known but what was read last. */
-function doing({ target, duty }: HeaterState): string {
+function doing(heater: HeaterState | undefined): string {
+  if (!heater) return 'Not known';
   if (!isReady.value) return 'Last reading';
-  return target > 0 ? `Heating ${formatNumber(duty * 100)} %` : 'Off';
+  const { temperature, target, duty } = heater;
+  if (target === 0) return 'Off';
+  const word = target - temperature > HEATING_BELOW_K ? 'Heating' : 'Holding';
+  return `${word}, ${formatNumber(duty * 100)} %`;
 }
 
-function Heater({ heater }: { readonly heater: HeaterState }): JSX.Element {
-  const max = machineSummary.value?.heaters.find(({ name }) => name === heater.name)?.max ?? TARGET_MAX_C;
-  const name = NAMES[heater.name];
+interface HeaterProps {
+  readonly name: HeaterName;
+  readonly heater: HeaterState | undefined;
+}
+
+function Heater({ name, heater }: HeaterProps): JSX.Element {
+  const max = machineSummary.value?.heaters.find((limits) => limits.name === name)?.max ?? TARGET_MAX_C;
+  const isHot = heater !== undefined && heater.temperature >= HOT_C;
+  const isOn = isReady.value && heater !== undefined && heater.target > 0;
   return (
     <li class="heater">
       <div class="heater-name">
-        {name}
-        <span class="heater-duty">{doing(heater)}</span>
+        {NAMES[name]}
+        <span class="heater-duty" title="What it does, and the share of the time that it is on">
+          {doing(heater)}
+        </span>
       </div>
-      <div class={`heater-reading ${heater.temperature >= HOT_C ? 'hot' : ''} ${isReady.value ? '' : 'old'}`}>
-        {formatNumber(heater.temperature, 1)}
+      <div class={`heater-reading ${isHot ? 'hot' : ''} ${isReady.value ? '' : 'old'}`}>
+        {heater ? formatNumber(heater.temperature, 1) : '–'}
         <span class="unit"> °C</span>
       </div>
       <NumberField
-        label={`${name} target`}
+        label={`${NAMES[name]} target`}
         hideLabel
         unit="°C"
-        value={isReady.value ? heater.target : 0}
+        value={isReady.value ? (heater?.target ?? 0) : 0}
         min={0}
         max={max}
-        disabled={!isReady.value}
-        onSet={(target) => setTarget(heater.name, target)}
+        why={notReady.value}
+        onSet={(target) => setTarget(name, target)}
       />
+      <Button
+        label={`${NAMES[name]} off`}
+        disabled={!isOn}
+        why={notReady.value}
+        onClick={() => setTarget(name, 0)}
+      >
+        Off
+      </Button>
     </li>
   );
 }
 
 export function Temperatures(): JSX.Element {
-  const heaters = snapshot.value?.heaters ?? [];
+  const read = snapshot.value?.heaters ?? [];
+  // Before a printer is connected, the heaters that its file has.
+  const names = read.length > 0 ? read : (machineSummary.value?.heaters ?? []);
   return (
     <Card title="Temperatures">
-      {heaters.length > 0 ? (
-        <ul class="heaters">
-          {heaters.map((heater) => (
-            <Heater key={heater.name} heater={heater} />
-          ))}
-        </ul>
-      ) : (
-        <p class="hint">Shown once a printer is connected.</p>
-      )}
+      <ul class="heaters">
+        {names.map(({ name }) => (
+          <Heater key={name} name={name} heater={read.find((heater) => heater.name === name)} />
+        ))}
+      </ul>
       <fieldset class="row wrap">
         <legend class="unseen">Presets</legend>
-        {settings.value.presets.map((preset) => (
-          <Button key={preset.name} disabled={!isReady.value} onClick={() => apply(preset)}>
+        {settings.value.presets.map((preset, index) => (
+          <Button key={index} why={notReady.value} onClick={() => apply(preset)}>
             {preset.name}
           </Button>
         ))}
-        <Button disabled={!isReady.value} onClick={() => apply({ name: '', nozzle: 0, bed: 0 })}>
+        <Button why={notReady.value} onClick={() => apply({ name: '', nozzle: 0, bed: 0 })}>
           Cool down
         </Button>
       </fieldset>
+      {notReady.value && <p class="hint">{notReady.value}</p>}
     </Card>
   );
 }

@@ -1,19 +1,11 @@
 // The bar at the top: what is connected, the dialogs' buttons, and the emergency stop, apart from everything else.
 import { computed, signal } from '@preact/signals';
 import type { JSX } from 'preact';
-import {
-  connection,
-  disconnect,
-  emergencyStop,
-  isPrinting,
-  job,
-  plannerLoaded,
-  port,
-  snapshot,
-} from '../state/machine';
+import { connection, disconnect, isPrinting, job, port, snapshot } from '../state/machine';
 import { activeProfile } from '../state/profiles';
-import { Icon } from './icons';
+import { EmergencyStop } from './emergency';
 import { Button } from './parts';
+import { ask } from './question';
 
 export const openDialog = signal<'connect' | 'settings' | 'machine' | null>(null);
 
@@ -40,9 +32,14 @@ const status = computed<Status>(() => {
 });
 
 function end(): void {
-  const question =
-    'A print is running. Disconnecting ends it: the board stops when its queue of moves is empty and switches the heaters off. Disconnect?';
-  if (!isPrinting.value || window.confirm(question)) disconnect();
+  if (!isPrinting.value) return disconnect();
+  ask({
+    title: 'Disconnect while printing?',
+    text: 'That ends the print: the board stops when its queue of moves is empty and switches the heaters off.',
+    yes: 'Disconnect',
+    no: 'Go on printing',
+    act: disconnect,
+  });
 }
 
 export function TopBar(): JSX.Element {
@@ -51,8 +48,8 @@ export function TopBar(): JSX.Element {
   return (
     <header class="top-bar">
       <h1 class="brand">
-        <img src="./icon.svg" alt="" width="28" height="28" />
-        <span>Stepcast</span>
+        <img src="./icon.svg" alt="Stepcast" width="28" height="28" />
+        <span aria-hidden="true">Stepcast</span>
       </h1>
       <p class={`status ${status.value.tone}`} role="status">
         <span class="dot" aria-hidden="true" />
@@ -77,17 +74,7 @@ export function TopBar(): JSX.Element {
           onClick={() => (openDialog.value = 'settings')}
         />
       </nav>
-      <button
-        type="button"
-        class="emergency"
-        onClick={emergencyStop}
-        disabled={isClosed || !plannerLoaded.value}
-      >
-        <Icon name="stop" />
-        <span>
-          Emergency<span class="emergency-more"> stop</span>
-        </span>
-      </button>
+      <EmergencyStop />
     </header>
   );
 }

@@ -1,8 +1,10 @@
 // What may be changed while printing: speed, flow, fan.
 import type { JSX } from 'preact';
-import { isReady, snapshot, wish } from '../state/machine';
+import { snapshot, wish } from '../state/machine';
 import { share } from '../units';
+import { machineSummary } from './machine_summary';
 import { Card, NumberField } from './parts';
+import { notReady } from './reasons';
 
 const percent = (value: number | undefined): number => Math.round((value ?? 0) * 100);
 
@@ -21,7 +23,7 @@ export function Tuning(): JSX.Element {
       value={value}
       min={min}
       max={max}
-      disabled={!isReady.value}
+      why={notReady.value}
       onSet={(set) => void wish({ kind, value: share(set / 100) })}
     />
   );
@@ -30,8 +32,9 @@ export function Tuning(): JSX.Element {
       <div class="fields">
         {field('Speed', 'speed-factor', percent(now?.speedFactor ?? 1), 10, 300)}
         {field('Flow', 'flow-factor', percent(now?.flowFactor ?? 1), 10, 200)}
-        {field('Part fan', 'fan', percent(now?.fan), 0, 100)}
+        {machineSummary.value?.hasFan !== false && field('Part fan', 'fan', percent(now?.fan), 0, 100)}
       </div>
+      {notReady.value && <p class="hint">{notReady.value}</p>}
     </Card>
   );
 }

@@ -4,9 +4,11 @@ import { effect, signal } from '@preact/signals';
 import { attachControls, ToolpathHost } from '@stepcast/toolpath';
 import type { JSX } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
-import { isPrinting, snapshot } from '../state/machine';
-import { file, printedVertex, reading, setSink, summary } from '../state/preview';
+import { isPrinting, isReady, snapshot } from '../state/machine';
+import { file, reading, setSink, summary } from '../state/preview';
+import { isShown, printedVertex } from '../state/print';
 import { change, settings } from '../state/settings';
+import { isDark } from '../state/theme';
 import { Icon } from './icons';
 import { Legend } from './legend';
 import { machineSummary } from './machine_summary';
@@ -17,11 +19,15 @@ import { Button } from './parts';
 /** The top layer that is shown; null: all of them. */
 const topLayer = signal<number | null>(null);
 const viewFailure = signal<string | null>(null);
-const dark = window.matchMedia('(prefers-color-scheme: dark)');
-const systemIsDark = signal(dark.matches);
-dark.addEventListener('change', (event) => {
-  systemIsDark.value = event.matches;
-});
+/** The view that is there, for the buttons over it. */
+let view: ToolpathHost | null = null;
+
+/** Where one looks from: turn around the vertical, height over the bed, both in radians. */
+const DIRECTIONS = [
+  { name: 'All', label: 'Show all of it', direction: { azimuth: -0.49, elevation: 0.56 } },
+  { name: 'Top', label: 'View from the top', direction: { azimuth: 0, elevation: 1.55 } },
+  { name: 'Front', label: 'View from the front', direction: { azimuth: 0, elevation: 0.05 } },
+] as const;
 
 function sizeOf(canvas: HTMLElement): { width: number; height: number; ratio: number } {
   const { clientWidth, clientHeight } = canvas;
@@ -37,20 +43,37 @@ const PRINTED_MS = 1000;
 
 /** Tells the printed part from the rest while printing; returns what ends that. */
 function followPrint(host: ToolpathHost): () => void {
-  const tell = (): void => {
-    const now = snapshot.peek();
-    host.setPrintedUpTo(isPrinting.peek() && now ? printedVertex(now) : null);
-  };
+  const tell = (): void => host.setPrintedUpTo(printedVertex());
   let timer: ReturnType<typeof setInterval> | undefined;
   const end = effect(() => {
     clearInterval(timer);
-    timer = isPrinting.value ? setInterval(tell, PRINTED_MS) : undefined;
+    timer = isPrinting.value && isShown.value ? setInterval(tell, PRINTED_MS) : undefined;
     tell();
   });
   return () => {
     clearInterval(timer);
     end();
   };
+}
+
+/** Where the nozzle is, while that is known. */
+function nozzle(): readonly [number, number, number] | null {
+  const now = snapshot.value;
+  if (!isReady.value || !now?.position || !now.homed.every(Boolean)) return null;
+  const [x, y, z] = now.position;
+  return [x, y, z];
+}
+
+/** Shows the nozzle as often as the machine tells of itself; returns what ends that. */
+function followNozzle(host: ToolpathHost): () => void {
+  let last = '';
+  return effect(() => {
+    const at = nozzle();
+    // A place that shows no difference is not drawn again.
+    const text = at ? at.map((value) => value.toFixed(2)).join() : '';
+    if (text !== last) host.setNozzle(at);
+    last = text;
+  });
 }
 
 /** Lets the view follow the page's state; returns what ends that. */
@@ -70,11 +93,7 @@ function follow(host: ToolpathHost): () => void {
     },
   });
   const ends = [
-    effect(() => {
-      const { theme } = settings.value;
-      const isDark = theme === 'system' ? systemIsDark.value : theme === 'dark';
-      host.setTheme(isDark ? 'dark' : 'light');
-    }),
+    effect(() => host.setTheme(isDark.value ? 'dark' : 'light')),
     effect(() => {
       const axes = machineSummary.value?.axes;
       const [x, y] = axes ?? [];
@@ -90,6 +109,7 @@ function follow(host: ToolpathHost): () => void {
       });
     }),
     followPrint(host),
+    followNozzle(host),
   ];
   return () => {
     for (const end of ends) end();
@@ -110,6 +130,7 @@ function Canvas(): JSX.Element {
         if (event.type === 'failed') viewFailure.value = event.reason;
       },
     });
+    view = host;
     const release = attachControls(parent, host);
     const observer = new ResizeObserver(() => host.resize(sizeOf(parent)));
     observer.observe(parent);
@@ -119,6 +140,7 @@ function Canvas(): JSX.Element {
       observer.disconnect();
       release();
       host.dispose();
+      view = null;
       canvas.remove();
     };
   }, []);
@@ -155,6 +177,32 @@ function LayerSlider(): JSX.Element | null {
   );
 }
 
+function Directions(): JSX.Element {
+  return (
+    <fieldset class="directions">
+      <legend class="unseen">View</legend>
+      {DIRECTIONS.map(({ name, label, direction }) => (
+        <button key={name} type="button" class="direction" title={label} onClick={() => view?.fit(direction)}>
+          {name}
+        </button>
+      ))}
+    </fieldset>
+  );
+}
+
+function NoView({ reason }: { readonly reason: string }): JSX.Element {
+  return (
+    <div class="view-failure" role="status">
+      <p class="trouble-what">There is no 3D view here.</p>
+      <p>
+        It needs WebGL 2. Most often graphics acceleration is switched off in the browser’s settings, or the
+        graphics driver is blocked. Everything else works without it, printing too.
+      </p>
+      <p class="hint">{reason}</p>
+    </div>
+  );
+}
+
 function Empty(): JSX.Element {
   return (
     <div class="empty">
@@ -179,15 +227,11 @@ export function Viewer(): JSX.Element {
     <section class="viewer" aria-label="Preview">
       <Canvas />
       {!file.value && <Empty />}
-      {viewFailure.value && (
-        <p class="view-failure">
-          The 3D view cannot be drawn: {viewFailure.value} Printing works without it.
-        </p>
-      )}
+      {viewFailure.value ? <NoView reason={viewFailure.value} /> : <Directions />}
       {progress !== null && (
         <progress class="reading" aria-label="Reading the file" max={1} value={progress} />
       )}
-      {summary.value && (
+      {summary.value && !viewFailure.value && (
         <div class="viewer-bar">
           <LayerSlider />
           <label class="check">
@@ -200,7 +244,7 @@ export function Viewer(): JSX.Element {
           </label>
         </div>
       )}
-      <Legend />
+      {!viewFailure.value && <Legend />}
     </section>
   );
 }

@@ -7,7 +7,7 @@ import initialise, { file_kind, Preview, parse_config } from '../bindings/wasm/p
 import type { Trouble } from '../machine/protocol';
 import { notGcode } from '../machine/troubles';
 import { inWords, plannerTrouble } from '../planner_error';
-import { mm, seconds } from '../units';
+import { celsius, mm, seconds } from '../units';
 import type { ConfigReport, Summary, VertexHeader } from './protocol';
 
 /** A file being read. */
@@ -60,7 +60,13 @@ function checkConfig(text: string): ConfigReport {
         min: mm(machine.min_mm[axis] ?? 0),
         max: mm(machine.max_mm[axis] ?? 0),
       })),
-      heaters: machine.heaters.map(({ name, max_c }) => ({ name, max: max_c })),
+      heaters: machine.heaters.map(({ name, max_c, min_extrude_c }) => ({
+        name,
+        max: celsius(max_c),
+        extrudeMin: min_extrude_c === null ? null : celsius(min_extrude_c),
+      })),
+      extrudeMax: machine.max_extrude_mm === null ? null : mm(machine.max_extrude_mm),
+      extrudeSpeedMax: machine.max_extrude_velocity_mm_s,
       hasFan: machine.has_fan,
       baud: machine.baud,
     },

@@ -1,6 +1,6 @@
 // What the page and the preview worker say to each other. Shapes only.
-import type { Trouble } from '../machine/protocol';
-import type { Mm, Seconds } from '../units';
+import type { HeaterName, Trouble } from '../machine/protocol';
+import type { Celsius, Mm, Seconds } from '../units';
 
 export type Severity = 'info' | 'warning' | 'blocking' | 'error';
 
@@ -46,10 +46,21 @@ export interface Summary {
   readonly generator: string | null;
 }
 
+export interface HeaterLimits {
+  readonly name: HeaterName;
+  readonly max: Celsius;
+  /** Filament may be pushed from here on; null for beds. */
+  readonly extrudeMin: Celsius | null;
+}
+
 /** What a printer.cfg describes. */
 export interface MachineSummary {
   readonly axes: readonly { readonly name: string; readonly min: Mm; readonly max: Mm }[];
-  readonly heaters: readonly { readonly name: string; readonly max: number }[];
+  readonly heaters: readonly HeaterLimits[];
+  /** The longest push of filament at once; null where the file sets none. */
+  readonly extrudeMax: Mm | null;
+  /** mm/s of filament alone. */
+  readonly extrudeSpeedMax: number | null;
   readonly hasFan: boolean;
   /** For boards on a UART. */
   readonly baud: number;

@@ -1,6 +1,7 @@
 // The machine as the page knows it, and what the page may ask of it. The other end is the machine worker.
 // Knows neither ports nor the protocol.
 import { computed, signal } from '@preact/signals';
+import type { VirtualState } from '../bindings/VirtualState';
 import type {
   FromMachine,
   MachineEvent,
@@ -21,6 +22,10 @@ export const plannerFailed = signal(false);
 export const connection = signal<ConnectionState>('closed');
 export const port = signal<PortChoice | null>(null);
 export const snapshot = signal<Snapshot | null>(null);
+/** The virtual printer's own record; of the last connection once that is closed. */
+export const virtualRecord = signal<VirtualState | null>(null);
+/** The planned speed around now while it is watched: pairs of s from now and mm/s. */
+export const plannedSpeed = signal(new Float64Array());
 export const firmware = signal<{ readonly version: string; readonly mcu: string } | null>(null);
 /** What the user has to be told, until it is put away or overtaken. */
 export const trouble = signal<Trouble | null>(null);
@@ -53,6 +58,7 @@ function closed(reason: Trouble | null): void {
   connection.value = 'closed';
   port.value = null;
   snapshot.value = null;
+  plannedSpeed.value = new Float64Array();
   firmware.value = null;
   for (const settle of waiting.values()) settle(null);
   waiting.clear();
@@ -82,6 +88,12 @@ function take(message: FromMachine): void {
       break;
     case 'snapshot':
       if (connection.value === 'open') snapshot.value = message.snapshot;
+      break;
+    case 'planned-speed':
+      if (connection.value === 'open') plannedSpeed.value = message.pairs;
+      break;
+    case 'record':
+      virtualRecord.value = message.record;
       break;
     case 'events':
       for (const event of message.events) happened(event);
@@ -157,9 +169,13 @@ export function connect(choice: PortChoice, config: string): void {
   if (connection.value !== 'closed') return;
   connection.value = 'opening';
   port.value = choice;
+  virtualRecord.value = null;
   trouble.value = null;
   send({ kind: 'connect', port: choice, config });
 }
+
+/** Whether `plannedSpeed` is wanted. */
+export const watchSpeed = (on: boolean): void => send({ kind: 'watch-speed', on });
 
 export const disconnect = (): void => send({ kind: 'disconnect' });
 

@@ -1,9 +1,10 @@
 // The file that is shown and may be printed: its reading, what was found in it, what the user has confirmed.
 // The other end is the preview worker, which never disturbs a running print.
 import { computed, effect, signal } from '@preact/signals';
-import type { Snapshot, Trouble } from '../machine/protocol';
+import type { Trouble } from '../machine/protocol';
 import { workerDied } from '../machine/troubles';
 import type { ConfigReport, FromPreview, Summary, ToPreview, VertexHeader } from '../preview/protocol';
+import { LineMarks } from './marks';
 import { activeProfile } from './profiles';
 
 export interface OpenFile {
@@ -35,8 +36,7 @@ let worker: Worker | undefined;
 let job = 0;
 let sink: GeometrySink | undefined;
 let configId = 0;
-let marks = new Uint32Array(4096);
-let marksUsed = 0;
+let marks = new LineMarks();
 const configs = new Map<number, (report: ConfigReport) => void>();
 
 export function startPreview(): void {
@@ -57,6 +57,9 @@ export function startPreview(): void {
 
 const send = (message: ToPreview): void => worker?.postMessage(message);
 
+/** The marks of the file that is shown; a file read later has others of its own. */
+export const lineMarks = (): LineMarks => marks;
+
 export function setSink(taker: GeometrySink): void {
   sink = taker;
 }
@@ -69,7 +72,7 @@ function read(config: string): void {
   summary.value = null;
   failure.value = null;
   confirmed.value = new Set();
-  marksUsed = 0;
+  marks = new LineMarks();
   sink?.clear();
   send({ kind: 'open', job, file: open.blob, name: open.name, config });
 }
@@ -126,7 +129,7 @@ function take(message: FromPreview): void {
       sink?.append(message.vertices);
       break;
     case 'marks':
-      keepMarks(message.marks);
+      marks.append(message.marks);
       break;
     case 'progress':
       reading.value = Math.min(1, message.bytes / Math.max(1, file.value?.blob.size ?? 1));
@@ -141,34 +144,4 @@ function take(message: FromPreview): void {
       failure.value = message.trouble;
       break;
   }
-}
-
-/** Adds pairs to those that are there; the memory doubles, so that a long file costs no more copies than a short one. */
-function keepMarks(more: Uint32Array): void {
-  if (marksUsed + more.length > marks.length) {
-    const larger = new Uint32Array(Math.max(marks.length * 2, marksUsed + more.length));
-    larger.set(marks.subarray(0, marksUsed));
-    marks = larger;
-  }
-  marks.set(more, marksUsed);
-  marksUsed += more.length;
-}
-
-/** The last vertex that has been printed when this line's moves have been made; a few dozen vertices short at most. */
-export function printedVertex({ line }: Snapshot): number {
-  let [low, high] = [0, marksUsed / 2];
-  while (low < high) {
-    const middle = (low + high) >>> 1;
-    if ((marks[middle * 2] ?? 0) <= line) low = middle + 1;
-    else high = middle;
-  }
-  return low === 0 ? 0 : (marks[low * 2 - 1] ?? 0);
-}
-
-/** How much of the print is done, by time where the plan is known, else by lines. */
-export function printedShare({ elapsed, line }: Snapshot): number {
-  const found = summary.value;
-  if (!found) return 0;
-  const [done, all] = found.time === null ? [line, found.lines] : [elapsed, found.time];
-  return all > 0 ? Math.min(1, done / all) : 0;
 }

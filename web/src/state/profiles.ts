@@ -61,13 +61,39 @@ async function keep(work: (db: IDBPDatabase<Schema>) => Promise<unknown>): Promi
   }
 }
 
+/** What came of the last file that was taken in, where that is worth a word. */
+export const importNotice = signal<string | null>(null);
+
+/** Takes a printer.cfg in as a profile of its own; puts it to use, if asked. */
+export async function importProfile(file: File, use = true): Promise<void> {
+  importNotice.value = null;
+  if (file.size > CONFIG_CHARACTERS_MAX) {
+    importNotice.value = `${file.name} is too large for a printer.cfg.`;
+    return;
+  }
+  if (profiles.value.length >= PROFILES_MAX) {
+    importNotice.value = `There are ${PROFILES_MAX} profiles already: delete one first.`;
+    return;
+  }
+  try {
+    const config = await file.text();
+    const name = file.name.replace(/\.(cfg|conf|txt)$/i, '').slice(0, 60) || 'Machine';
+    await saveProfile({ id: newProfileId(), name, config }, use);
+    importNotice.value = use
+      ? `${file.name} is now the profile “${name}”.`
+      : `${file.name} is kept as “${name}”.`;
+  } catch {
+    importNotice.value = `${file.name} could not be read.`;
+  }
+}
+
 /** Keeps a profile, new or changed, and puts it to use. */
-export async function saveProfile(profile: Profile): Promise<void> {
+export async function saveProfile(profile: Profile, use = true): Promise<void> {
   const known = profiles.value.some(({ id }) => id === profile.id);
   profiles.value = known
     ? profiles.value.map((other) => (other.id === profile.id ? profile : other))
     : [...profiles.value, profile].slice(0, PROFILES_MAX);
-  change({ profile: profile.id });
+  if (use) change({ profile: profile.id });
   await keep((db) => db.put('profiles', profile));
 }
 

@@ -21,13 +21,20 @@ export interface Settings {
   readonly speed: number;
   readonly presets: readonly Preset[];
   readonly jogStep: number;
+  /** mm of filament. */
   readonly extrudeLength: number;
+  /** mm of filament a second. */
+  readonly extrudeSpeed: number;
   readonly showTravel: boolean;
+  readonly showInstruments: boolean;
 }
 
 const KEY = 'stepcast-settings';
 export const PRESETS_MAX = 8;
 export const SPEED_MAX = 200;
+/** What the fields take; the machine's own limits hold besides. */
+export const EXTRUDE_MAX_MM = 100;
+export const EXTRUDE_SPEED_MAX_MM_S = 50;
 export const JOG_STEPS = [0.1, 1, 10, 50] as const;
 
 export const DEFAULTS: Settings = {
@@ -43,7 +50,9 @@ export const DEFAULTS: Settings = {
   ],
   jogStep: 10,
   extrudeLength: 5,
+  extrudeSpeed: 3,
   showTravel: false,
+  showInstruments: false,
 };
 
 const between = (value: unknown, min: number, max: number, otherwise: number): number =>
@@ -84,8 +93,10 @@ export function readSettings(text: string | null): Settings {
     speed: between(stored.speed, 1, SPEED_MAX, DEFAULTS.speed),
     presets: readPresets(stored.presets),
     jogStep: oneOf(stored.jogStep, JOG_STEPS, DEFAULTS.jogStep),
-    extrudeLength: between(stored.extrudeLength, 0.1, 100, DEFAULTS.extrudeLength),
+    extrudeLength: between(stored.extrudeLength, 0.1, EXTRUDE_MAX_MM, DEFAULTS.extrudeLength),
+    extrudeSpeed: between(stored.extrudeSpeed, 0.1, EXTRUDE_SPEED_MAX_MM_S, DEFAULTS.extrudeSpeed),
     showTravel: stored.showTravel === true,
+    showInstruments: stored.showInstruments === true,
   };
 }
 

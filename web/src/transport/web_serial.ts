@@ -8,6 +8,8 @@ import { PortError, type Transport } from './transport';
 const BUFFER_BYTES = 64 * 1024;
 /** So many errors with no byte between them are not a noisy line but a broken one. */
 const ERRORS_IN_A_ROW_MAX = 50;
+/** A device that does not take its last bytes, or a system that does not let go of a port, is not waited for longer. */
+const CLOSE_MS_MAX = 500;
 /** Errors after which the browser offers a new stream at once. */
 const RECOVERABLE = new Set([
   'BreakError',
@@ -55,6 +57,24 @@ export async function openSerial(port: SerialPort, baudRate: number): Promise<Tr
     throw new PortError(code, error);
   }
   return new SerialTransport(port);
+}
+
+/**
+ * Waits until something has ended, but not for ever; false where it has not. Streams that ended in an error cannot be
+ * ended again; the port must be closed all the same.
+ */
+async function settle(ending: Promise<unknown> | undefined): Promise<boolean> {
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const late = new Promise<boolean>((resolve) => {
+    timer = setTimeout(() => resolve(false), CLOSE_MS_MAX);
+  });
+  const ended = Promise.resolve(ending).then(
+    () => true,
+    () => true,
+  );
+  const hasEnded = await Promise.race([ended, late]);
+  clearTimeout(timer);
+  return hasEnded;
 }
 
 class SerialTransport implements Transport {
@@ -158,14 +178,18 @@ class SerialTransport implements Transport {
     if (this.#closing) return;
     this.#closing = true;
     this.#port.removeEventListener('disconnect', this.#unplugged);
-    // Streams that ended in an error cannot be ended again; the port must be closed all the same.
-    const settle = (promise: Promise<unknown> | undefined): Promise<unknown> =>
-      Promise.resolve(promise).catch(() => undefined);
     await settle(this.#reader?.cancel());
     this.#release();
-    await settle(this.#writer?.close());
-    this.#writer?.releaseLock();
-    this.#writer = undefined;
+    await this.#endWriting();
     await settle(this.#port.close());
+  }
+
+  async #endWriting(): Promise<void> {
+    const writer = this.#writer;
+    this.#writer = undefined;
+    if (!writer || (await settle(writer.close()))) return writer?.releaseLock();
+    // A port with a stream that still waits for its device cannot be closed.
+    await settle(writer.abort());
+    writer.releaseLock();
   }
 }

@@ -235,6 +235,14 @@ impl Interpreter {
         self.position[..3].copy_from_slice(&[x, y, z]);
     }
 
+    /// A move that no line asks for, by this much from where the last one ended (mm; `e` of filament). Modes, factors,
+    /// offsets and the feed of the lines that follow stay as they are, and have no part in it.
+    pub fn move_by(&mut self, by: [f64; 4], feed: MmPerS) -> Move {
+        let from = self.position();
+        self.position = core::array::from_fn(|axis| self.position[axis] + by[axis]);
+        Move { line: LineNumber(0), from, to: self.position(), feed, rapid: false }
+    }
+
     /// The speed factor, 1 = as the file says.
     pub fn speed_factor(&self) -> f64 {
         self.speed_factor

@@ -27,7 +27,8 @@ pub use source::{SOURCE_BYTES_MAX, Source};
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
-    machine::{self, EXTRUDER, MOTORS},
+    machine::{self, EXTRUDER},
+    step_rate::StepRates,
 };
 
 /// How far the run of motion is.
@@ -63,6 +64,7 @@ const DWELL_IN_RUN_MAX: Seconds = Seconds(2.0);
 struct Said {
     pressure_advance: bool,
     other_fans: bool,
+    slowed: bool,
 }
 
 /// Turns G-code into step commands.
@@ -86,8 +88,7 @@ pub struct Planner {
     ready: VecDeque<Planned>,
     barrier: Option<(LineNumber, Barrier)>,
     said: Said,
-    /// What each motor's driver can follow, as the speed of its axis.
-    motor_speed_max: [MmPerS; MOTORS],
+    step_rates: StepRates,
     is_broken: bool,
 }
 
@@ -113,7 +114,7 @@ impl Planner {
             ready: VecDeque::new(),
             barrier: None,
             said: Said::default(),
-            motor_speed_max: machine::motor_speeds_max(config, clock),
+            step_rates: StepRates::new(config, clock),
             is_broken: false,
         })
     }
@@ -269,7 +270,7 @@ impl Planner {
                 continue;
             }
             if let Some(chord) = source.next_chord() {
-                self.judge_and_push(&chord, source.e_offset)?;
+                self.judge_and_push(&chord, source)?;
                 continue;
             }
             match source.next() {
@@ -285,7 +286,7 @@ impl Planner {
     fn act(&mut self, action: Action, source: &mut Source) -> Result<(), PrinterError> {
         let line = source.line();
         match action {
-            Action::Move(mv) => self.judge_and_push(&mv, source.e_offset)?,
+            Action::Move(mv) => self.judge_and_push(&mv, source)?,
             Action::Arc(arc) => source.draw(&arc),
             Action::VelocityLimit(limit) => self.limit(limit),
             Action::SetTemperature { heater, target, wait: Wait::No } => {
@@ -355,20 +356,7 @@ impl Planner {
 
     /// A file may ask for less speed and acceleration than the machine file allows, never for more.
     fn limit(&mut self, limit: VelocityLimit) {
-        let machine = &self.machine_limits;
-        let mut limits = self.limits;
-        if let Some(velocity) = limit.velocity {
-            limits.max_velocity = velocity.min(machine.max_velocity);
-        }
-        if let Some(accel) = limit.accel {
-            limits.max_accel = accel.min(machine.max_accel);
-        }
-        if let Some(corner) = limit.square_corner_velocity {
-            limits.square_corner_velocity = corner.min(machine.square_corner_velocity);
-        }
-        if let Some(ratio) = limit.minimum_cruise_ratio {
-            limits.minimum_cruise_ratio = ratio;
-        }
+        let limits = machine::lowered(&self.machine_limits, &self.limits, &limit);
         // Limits that make no sense (zero, not a number) leave those that hold.
         if self.look_ahead.set_limits(limits).is_ok() {
             self.limits = limits;
@@ -390,43 +378,34 @@ impl Planner {
         }
     }
 
-    fn judge_and_push(&mut self, mv: &Move, e_offset: f64) -> Result<(), PrinterError> {
+    fn judge_and_push(&mut self, mv: &Move, source: &Source) -> Result<(), PrinterError> {
+        let e_offset = source.e_offset;
         let to = [mv.to.x, mv.to.y, mv.to.z, mv.to.e + e_offset];
         // Judged from where the machine is, not from where the source believes that it is.
         let [x, y, z, e] = self.position;
         let from = gcode::Position { x, y, z, e: e - e_offset };
         self.guard.judge(&Move { from, ..*mv })?;
-        self.push(to, mv.feed, mv.line)
+        let feed = self.feed(mv, to, source);
+        self.push(to, feed, mv.line)
     }
 
-    /// Refuses what no driver can step, by the highest speed that the limits leave. An extruder that moves along with
-    /// the axes is judged when its steps are made: its junctions slow it down.
-    fn judge_speed(&self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
-        let delta: [f64; MOTORS] = core::array::from_fn(|motor| to[motor] - self.position[motor]);
-        let travel = delta[..3].iter().map(|d| d * d).sum::<f64>().sqrt();
-        let limits = &self.limits;
-        let (length, speed, motors) = if travel > 0.0 {
-            (travel, feed.min(limits.max_velocity), 0..EXTRUDER)
-        } else {
-            let speed = feed.min(limits.extruder.max_extrude_only_velocity);
-            (delta[EXTRUDER].abs(), speed, EXTRUDER..MOTORS)
-        };
-        for motor in motors {
-            let share = delta[motor].abs() / length;
-            let z_bound = if motor == 2 { limits.max_z_velocity } else { speed };
-            if share > 0.0 && z_bound.min(speed * share) > self.motor_speed_max[motor] {
-                let detail = format!("{} at {:.0} mm/s", machine::MOTOR_NAMES[motor], speed.0 * share);
-                return Err(PrinterError::new(ErrorCode::StepRateTooHigh, detail).at_line(line.0));
-            }
+    /// A move's feed; one that a factor has made faster than the motors can follow is slowed down to what they can.
+    fn feed(&mut self, mv: &Move, to: Position, source: &Source) -> MmPerS {
+        if source.interpreter.speed_factor() <= 1.0 && source.interpreter.flow_factor() <= 1.0 {
+            return mv.feed;
         }
-        Ok(())
+        let feed = self.step_rates.slowed(self.position, to, mv.feed);
+        if feed < mv.feed && !core::mem::replace(&mut self.said.slowed, true) {
+            self.notice(mv.line, "a move is made slower than the factor asks: a motor cannot step faster");
+        }
+        feed
     }
 
     fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
         if to == self.position {
             return Ok(());
         }
-        self.judge_speed(to, feed, line)?;
+        self.step_rates.judge_request(self.position, to, feed, &self.limits, line)?;
         if self.run == Run::None {
             self.look_ahead.begin_run();
             self.generator.begin_run(self.position).map_err(|error| wrong(&error).at_line(line.0))?;
@@ -445,6 +424,10 @@ impl Planner {
     }
 
     fn take_planned(&mut self, planned: PlannedMove) -> Result<(), PrinterError> {
+        if let Err(error) = self.step_rates.judge_planned(&planned) {
+            self.is_broken = true;
+            return Err(error);
+        }
         if let Err(error) = self.generator.push(&planned) {
             self.is_broken = true;
             let code = match error {

@@ -12,7 +12,7 @@ use super::{Barrier, Planned, Planner, Source};
 use crate::{
     config::PrinterConfig,
     error::PrinterError,
-    machine::{EXTRUDER, MOTORS},
+    machine::{self, EXTRUDER, MOTORS},
 };
 
 /// The clock for which a plan's bytes are stated.
@@ -62,7 +62,7 @@ impl PlanStream {
     pub fn new(config: &PrinterConfig) -> Result<Self, PrinterError> {
         let mut planner = Planner::new(config, PLAN_CLOCK)?;
         planner.guard.extrusion = super::ExtrusionPermit::Allowed;
-        let mut source = Source::default();
+        let mut source = Source::new(machine::gcode_settings(config));
         planner.adopt(&mut source);
         Ok(Self {
             planner,

@@ -3,6 +3,7 @@
 use gcode::{
     Action, Arc, CHORD_TOLERANCE, Chords, Diagnostic, Interpreter, LineNumber, Lines, Move, Settings,
 };
+use units::{Mm, MmPerS};
 
 /// The most bytes a source holds before it says that it wants no more.
 pub const SOURCE_BYTES_MAX: usize = 64 * 1024;
@@ -63,6 +64,24 @@ impl Source {
     /// Takes the next bytes of the stream.
     pub fn feed(&mut self, bytes: &[u8]) {
         self.lines.feed(bytes);
+    }
+
+    /// Takes a text of its own, of which the first line is line 1. Everything before has been read.
+    pub fn begin_text(&mut self, text: &[u8]) {
+        debug_assert!(self.is_drained(), "what was fed before is read first");
+        self.lines = Lines::new();
+        self.lines.feed(text);
+        self.lines.feed(b"\n");
+    }
+
+    /// Takes a move of one axis, or of the filament, that no line asks for. Everything before has been read.
+    pub fn move_by(&mut self, axis: usize, distance: Mm, feed: MmPerS) {
+        debug_assert!(self.is_drained(), "what was fed before is read first");
+        let mut by = [0.0; 4];
+        by[axis] = distance.0;
+        self.line = LineNumber(0);
+        self.next_action = 0;
+        self.actions = vec![Action::Move(self.interpreter.move_by(by, feed))];
     }
 
     /// Whether everything that was fed has been read.

@@ -5,7 +5,7 @@ use steps::StepCommandKind;
 use units::Celsius;
 
 use super::*;
-use crate::config;
+use crate::{config, machine::MOTORS};
 
 const CLOCK: Hertz = Hertz(12_000_000);
 
@@ -243,4 +243,54 @@ fn every_step_of_a_run_comes_before_its_end() {
     assert!(ended);
     assert_eq!(steps, [0; MOTORS]);
     assert_eq!(planner.generator().stats()[0].steps, 2 * 800);
+}
+
+#[test]
+fn a_plan_retracts_as_the_machine_file_says() {
+    let filament_mm = |length: f64| {
+        let mut config = machine_file();
+        config.firmware_retraction.as_mut().expect("the sample has it").retract_length = units::Mm(length);
+        let mut plan = PlanStream::new(&config).unwrap();
+        let mut blocks = Vec::new();
+        plan.feed(b"G28\nG10\nG1 X10 F3000\n", &mut blocks, |_| {}).unwrap();
+        plan.finish(&mut blocks, |_| {}).unwrap().filament_mm
+    };
+    assert!((filament_mm(0.8) + 0.8).abs() < 0.01);
+    assert!((filament_mm(2.0) + 2.0).abs() < 0.01);
+}
+
+#[test]
+fn what_a_factor_makes_too_fast_for_a_motor_is_slowed_down_and_what_the_file_asks_is_refused() {
+    // 2257 steps/mm of filament: with pulses of 2 µs 110 mm/s are the most.
+    let text = include_str!("../../../../samples/printer.cfg");
+    let fine = text.replacen("rotation_distance: 22.6789511", "rotation_distance: 1.41743444", 1);
+    assert_ne!(fine, text, "the sample machine's extruder");
+    let config = config::parse(&fine).0.unwrap();
+    let slowest = StepRates::new(&config, CLOCK).slowed([0.0; 4], [0.0, 0.0, 0.0, 1.0], MmPerS(1e9));
+    let plan = |factors: &str, feed_mm_min: u32| {
+        let mut planner = Planner::new(&config, CLOCK).unwrap();
+        (0..3).for_each(|axis| planner.set_axis(axis, 0.0, true));
+        planner.guard.extrusion = ExtrusionPermit::Allowed;
+        let mut source = Source::default();
+        planner.begin_job(&mut source);
+        feed(&mut source, &format!("M83\n{factors}\nG1 X100 E75 F{feed_mm_min}\n"));
+        let mut items = Vec::new();
+        loop {
+            match planner.next(&mut source) {
+                Ok(Planned::EndOfSource) => return Ok(items),
+                Ok(item) => items.push(item),
+                Err(error) => return Err(error.code),
+            }
+        }
+    };
+    assert_eq!(plan("M220 S100", 12_000), Err(ErrorCode::StepRateTooHigh));
+    for factors in ["M220 S300", "M220 S200\nM221 S102"] {
+        let items = plan(factors, 7200).unwrap();
+        let filament = moves(&items)[0];
+        let speed = filament.cruise_velocity * filament.direction[EXTRUDER].abs();
+        assert!((speed - slowest.0).abs() < 1e-6 * slowest.0, "{speed} mm/s of {slowest:?}");
+        let said =
+            |item: &&Planned| matches!(item, Planned::Notice(notice) if notice.message.contains("slower"));
+        assert_eq!(items.iter().filter(said).count(), 1);
+    }
 }

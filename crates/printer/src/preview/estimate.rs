@@ -3,13 +3,15 @@
 //! Counts what [`PlanStream`](crate::planner::PlanStream) counts: motion and the file's own dwells; neither homing nor
 //! waiting for temperatures. Times in seconds.
 
-use gcode::{Action, Move, Wait};
-use motion::{Limits, LookAhead, MoveRequest};
+use std::collections::VecDeque;
+
+use gcode::{Action, LineNumber, Move, Wait};
+use motion::{Limits, LookAhead, MoveRequest, PlannedMove};
 use units::Seconds;
 
 use super::encoder::Segment;
 use super::vertex::FEATURES;
-use crate::{config::PrinterConfig, machine};
+use crate::{config::PrinterConfig, error::PrinterError, machine, planner::PLAN_CLOCK, step_rate::StepRates};
 
 /// What a planned move is counted under: 5 bits of the tag are the feature, the rest is the layer.
 const TRAVEL_TAG: u32 = 31;
@@ -20,6 +22,11 @@ const TAG_BITS: u32 = 5;
 pub(super) struct Estimate {
     machine: Limits,
     look_ahead: LookAhead,
+    /// The lines of the moves in the look-ahead.
+    lines: VecDeque<LineNumber>,
+    step_rates: StepRates,
+    /// The first move that is found to be too fast for its motors, until it is taken.
+    pub(super) too_fast: Option<PrinterError>,
     running: bool,
     total_s: f64,
     failed: bool,
@@ -34,6 +41,9 @@ impl Estimate {
         Some(Self {
             machine: limits,
             look_ahead: LookAhead::new(limits).ok()?,
+            lines: VecDeque::new(),
+            step_rates: StepRates::new(config, PLAN_CLOCK),
+            too_fast: None,
             running: false,
             total_s: 0.0,
             failed: false,
@@ -56,9 +66,14 @@ impl Estimate {
             Segment::Extrusion(feature) => u32::from(feature),
         };
         let request = MoveRequest { from, to, feed: mv.feed, tag: layer << TAG_BITS | feature };
+        let before = self.look_ahead.len();
         if self.look_ahead.push(&request).is_err() {
             self.failed = true;
             self.look_ahead.begin_run();
+            self.lines.clear();
+        } else if self.look_ahead.len() > before {
+            // One without length is dropped.
+            self.lines.push_back(mv.line);
         }
         self.take();
     }
@@ -100,6 +115,7 @@ impl Estimate {
 
     fn take(&mut self) {
         while let Some(planned) = self.look_ahead.pop() {
+            self.judge(&planned);
             let time = planned.duration();
             let (layer, feature) = (planned.tag >> TAG_BITS, planned.tag & TRAVEL_TAG);
             if let Some(sum) = self.feature_s.get_mut(feature as usize) {
@@ -110,6 +126,13 @@ impl Estimate {
                 self.layer_s.resize(layer + 1, 0.0);
             }
             self.layer_s[layer] += time;
+        }
+    }
+
+    fn judge(&mut self, planned: &PlannedMove) {
+        let line = self.lines.pop_front().unwrap_or_default();
+        if let Err(error) = self.step_rates.judge_planned(planned) {
+            self.too_fast.get_or_insert(error.at_line(line.0));
         }
     }
 

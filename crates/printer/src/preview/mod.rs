@@ -198,6 +198,7 @@ impl Preview {
     fn act(&mut self, action: Action, out: &mut Vec<u32>) {
         if let Some(estimate) = &mut self.estimate {
             estimate.act(&action);
+            self.checker.add(estimate.too_fast.take());
         }
         match action {
             Action::Move(mv) => self.mv(&mv, out),
@@ -215,6 +216,7 @@ impl Preview {
         let segment = self.encoder.mv(mv, out);
         if let Some(estimate) = &mut self.estimate {
             estimate.mv(mv, segment, self.encoder.layers.number());
+            self.checker.add(estimate.too_fast.take());
         }
     }
 
@@ -233,6 +235,7 @@ impl Preview {
             self.encoder.marks.clear();
         }
         let print_time = self.estimate.as_mut().and_then(Estimate::finish);
+        self.checker.add(self.estimate.as_mut().and_then(|estimate| estimate.too_fast.take()));
         let (features, layer_s) = self.totals();
         let in_features: f64 = features.iter().map(|feature| feature.time.0).sum();
         let layers = self.encoder.layers.list().iter().enumerate().map(|(number, layer)| LayerReport {

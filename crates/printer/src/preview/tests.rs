@@ -2,6 +2,7 @@ use super::vertex::{Flags, Vertex};
 use super::*;
 use crate::{
     config::{SMALL_MACHINE, parse},
+    error::ErrorCode,
     planner::PlanStream,
 };
 
@@ -102,22 +103,31 @@ fn a_slicer_without_comments_has_layers_too() {
 #[test]
 fn the_time_is_the_plans() {
     let config = machine();
-    let (_, _, preview) = read(TEST_PART.as_bytes(), Some(&config), 100_000);
-    let report = preview.finish();
-    let mut plan = PlanStream::new(&config).unwrap();
-    let mut blocks = Vec::new();
-    for piece in TEST_PART.as_bytes().chunks(32 * 1024) {
-        plan.feed(piece, &mut blocks, |_| {}).unwrap();
-        blocks.clear();
+    // The machine's endstops are at 0, where a plan's axes are after homing.
+    for file in [TEST_PART, SMALL_PART] {
+        let (_, _, preview) = read(file.as_bytes(), Some(&config), 100_000);
+        let report = preview.finish();
+        let mut plan = PlanStream::new(&config).unwrap();
+        let mut blocks = Vec::new();
+        for piece in file.as_bytes().chunks(32 * 1024) {
+            plan.feed(piece, &mut blocks, |_| {}).unwrap();
+            blocks.clear();
+        }
+        let expected = plan.finish(&mut blocks, |_| {}).unwrap();
+        let found = report.print_time.unwrap().0;
+        let apart = (found - expected.print_time.0).abs();
+        assert!(apart < 1e-6, "{found} {}", expected.print_time);
+        assert!((report.check.filament_mm - expected.filament_mm).abs() < 1e-6);
+        let features: f64 = report.features.iter().map(|feature| feature.time.0).sum();
+        let layers: f64 = report.layers.iter().map(|layer| layer.time.0).sum();
+        assert!((features + report.travel_time.0 - found).abs() < 1e-6);
+        assert!((layers - found).abs() < 1e-6, "{layers} {found}");
     }
-    let expected = plan.finish(&mut blocks, |_| {}).unwrap().print_time.0;
-    let found = report.print_time.unwrap().0;
-    // The plan's axes are at 0 after homing, those here where their endstops are: the first move differs.
-    assert!((found - expected).abs() < 1e-3 * expected, "{found} {expected}");
-    let features: f64 = report.features.iter().map(|feature| feature.time.0).sum();
-    let layers: f64 = report.layers.iter().map(|layer| layer.time.0).sum();
-    assert!((features + report.travel_time.0 - found).abs() < 1e-6);
-    assert!((layers - found).abs() < 1e-6, "{layers} {found}");
+}
+
+#[test]
+fn a_slicers_name_and_estimate_are_told() {
+    let report = read(TEST_PART.as_bytes(), None, 100_000).2.finish();
     assert!(report.slicer_time.is_some() && report.generator.is_some());
 }
 
@@ -289,4 +299,30 @@ fn it_takes_no_more_than_it_wants() {
     while preview.run(&mut words) {}
     assert_eq!(preview.wants(), INPUT_BYTES_MAX);
     assert_eq!(preview.read_bytes(), INPUT_BYTES_MAX as u64);
+}
+
+#[test]
+fn an_extruder_that_would_step_too_fast_along_with_the_axes_is_found_at_its_line() {
+    // 4515 steps/mm of filament: with pulses of 2 µs 55 mm/s are the most.
+    let (usual, fine) = ("rotation_distance: 22.6789511", "rotation_distance: 0.70871722");
+    let config = parse(&MACHINE.replacen(usual, fine, 1)).0.unwrap();
+    let errors = |config: &PrinterConfig, gcode: &str| {
+        let text = format!("G28\nM104 S200\nM83\nG1 X50 F6000\n{gcode}\nG1 X0\nM104 S0\n");
+        let errors = read(text.as_bytes(), Some(config), usize::MAX).2.finish().check.errors;
+        errors.iter().map(|error| (error.code, error.line)).collect::<Vec<_>>()
+    };
+    let too_fast = |line| vec![(ErrorCode::StepRateTooHigh, Some(line))];
+    assert_eq!(errors(&config, "G1 X150 E75 F6000"), too_fast(5));
+    assert_eq!(
+        errors(&config, "G1 X150 E75 F6000\nG1 X999"),
+        [(ErrorCode::StepRateTooHigh, Some(5)), (ErrorCode::MoveOutOfRange, Some(6))]
+    );
+    assert_eq!(
+        errors(&config, "SET_VELOCITY_LIMIT ACCEL=500\nG1 X51 E0.75 F6000\nG1 X150 E75 F6000"),
+        too_fast(7)
+    );
+    // It is the speed that is reached that counts, and the motor.
+    assert_eq!(errors(&config, "G1 X50.5 E0.37 F6000"), []);
+    assert_eq!(errors(&config, "G1 X150 E50 F6000"), []);
+    assert_eq!(errors(&machine(), "G1 X150 E75 F6000"), []);
 }

@@ -31,6 +31,8 @@ const ADC_MAX_DEFAULT: f64 = 4095.0;
 const ADC_MAX_MAX: f64 = 8191.0;
 /// A board that has not taken its configuration in after this long never will.
 const CONNECT_MAX: Seconds = Seconds(60.0);
+/// With so large a share of printable bytes, what a board says is text; noise has a third.
+const TEXT_SHARE_MIN: f64 = 0.9;
 /// With fewer moves in its queue a board cannot be kept supplied.
 const MOVE_COUNT_MIN: u16 = 64;
 
@@ -43,6 +45,38 @@ pub(super) struct Identifying {
     not_before: Seconds,
     /// It has been spoken to.
     has_begun: bool,
+    heard: Heard,
+}
+
+/// What came from a board that has not said who it is.
+#[derive(Clone, Copy, Debug, Default)]
+struct Heard {
+    bytes: u64,
+    /// Those that a text is made of.
+    printable: u64,
+}
+
+impl Heard {
+    fn take(&mut self, bytes: &[u8]) {
+        let is_printable = |byte: &&u8| matches!(byte, b' '..=b'~' | b'\t' | b'\r' | b'\n');
+        self.bytes += bytes.len() as u64;
+        self.printable += bytes.iter().filter(is_printable).count() as u64;
+    }
+
+    /// Why such a board could not be identified; `answered` says that sound blocks came.
+    fn explain(self, answered: bool) -> PrinterError {
+        let Self { bytes, printable } = self;
+        let (code, detail) = if bytes == 0 {
+            (ErrorCode::BoardSilent, "nothing came from it")
+        } else if answered {
+            (ErrorCode::WrongFirmware, "it speaks the protocol, but does not say who it is")
+        } else if printable as f64 >= TEXT_SHARE_MIN * bytes as f64 {
+            (ErrorCode::WrongFirmware, "it answers in text")
+        } else {
+            (ErrorCode::BoardUnreadable, "what came is neither text nor a sound message")
+        };
+        PrinterError::new(code, detail)
+    }
 }
 
 impl Identifying {
@@ -54,6 +88,7 @@ impl Identifying {
             identify: Identify::new(),
             not_before: now,
             has_begun: true,
+            heard: Heard::default(),
         }
     }
 
@@ -63,7 +98,8 @@ impl Identifying {
     }
 
     pub(super) fn receive(&mut self, bytes: &[u8], now: Seconds) -> Result<Option<Dictionary>, PrinterError> {
-        let Self { link, bootstrap, identify, .. } = self;
+        let Self { link, bootstrap, identify, heard, .. } = self;
+        heard.take(bytes);
         let mut result = Ok(None);
         link.receive(bytes, now, |payload| {
             let mut rest = payload.bytes;
@@ -73,7 +109,7 @@ impl Identifying {
                 match identify.receive(offset, data, now) {
                     Ok(None) => {}
                     Ok(Some(dictionary)) => result = Ok(Some(dictionary)),
-                    Err(error) => result = Err(identify_error(&error)),
+                    Err(error) => result = Err(dictionary_error(&error)),
                 }
             }
         });
@@ -85,7 +121,11 @@ impl Identifying {
             return Ok(self.not_before);
         }
         self.has_begun = true;
-        if let Some(request) = self.identify.poll(now).map_err(|error| identify_error(&error))? {
+        let asked = self.identify.poll(now).map_err(|error| match error {
+            IdentifyError::Silent => self.heard.explain(self.link.stats().last_received.is_some()),
+            error => dictionary_error(&error),
+        });
+        if let Some(request) = asked? {
             let command = Command::Identify { offset: request.offset, count: request.count };
             if let Ok(message) = Outgoing::command(Lane::Control, &self.bootstrap, &command) {
                 let _ = self.link.queue(message);
@@ -105,12 +145,8 @@ impl Identifying {
     }
 }
 
-fn identify_error(error: &IdentifyError) -> PrinterError {
-    let code = match error {
-        IdentifyError::Silent => ErrorCode::BoardSilent,
-        IdentifyError::TooLarge | IdentifyError::Dictionary(_) => ErrorCode::DictionaryInvalid,
-    };
-    PrinterError::new(code, error.to_string())
+fn dictionary_error(error: &IdentifyError) -> PrinterError {
+    PrinterError::new(ErrorCode::DictionaryInvalid, error.to_string())
 }
 
 /// What is being waited for.

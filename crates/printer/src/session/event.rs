@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 
 use gcode::{Annotation, Diagnostic, Heater, ObjectAction};
-use units::{Celsius, Seconds, Ticks};
+use motion::PlannedMove;
+use units::{Celsius, Mm, MmPerS, Seconds, Ticks};
 
 use crate::{error::PrinterError, planner::Position};
 
@@ -94,6 +95,11 @@ pub enum Event {
         /// The board's clock.
         at: Ticks,
     },
+    /// A run of motion was broken off before its end: its motors stood still at this clock at the latest.
+    RunBroken {
+        /// The board's clock.
+        at: Ticks,
+    },
     /// An axis found its endstop: it is at this position now.
     Homed {
         /// 0, 1, 2 for X, Y, Z.
@@ -159,8 +165,44 @@ pub struct ScheduledMove {
     pub from: Position,
     /// Where it ends.
     pub to: Position,
+    /// How fast.
+    pub speed: SpeedProfile,
     /// Whether it belongs to homing, where a trigger may cut it short.
     pub homing: bool,
+}
+
+/// How fast the toolhead is during a move: a trapezoid on the board's clock, between the move's start and its end. Zero
+/// throughout where only filament moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SpeedProfile {
+    /// At the move's start.
+    pub start: MmPerS,
+    /// The highest.
+    pub cruise: MmPerS,
+    /// At the move's end.
+    pub end: MmPerS,
+    /// When it has sped up.
+    pub cruise_from: Ticks,
+    /// When it begins to slow down.
+    pub cruise_until: Ticks,
+}
+
+impl SpeedProfile {
+    /// Of a planned move; `at` turns print time into the board's clock.
+    pub(super) fn new(planned: &PlannedMove, at: impl Fn(f64) -> Ticks) -> Self {
+        let [x, y, z, _] = planned.direction;
+        // 1 or 0: a path with travel in it is measured along the travel.
+        let share = (x * x + y * y + z * z).sqrt();
+        // Summed up as the move's end is, so that no rounding brings them out of order.
+        let cruise_until = planned.accel_time + planned.cruise_time;
+        Self {
+            start: MmPerS(planned.start_velocity * share),
+            cruise: MmPerS(planned.cruise_velocity * share),
+            end: MmPerS(planned.end_velocity * share),
+            cruise_from: at(planned.start_time + planned.accel_time),
+            cruise_until: at(planned.start_time + cruise_until),
+        }
+    }
 }
 
 /// How far a connection is.
@@ -185,8 +227,18 @@ pub enum PhaseName {
 /// What an owner may ask.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
-    /// Lines of G-code, typed by a user.
+    /// Lines of G-code, typed by a user. Each text's lines are counted from 1.
     Gcode(String),
+    /// A move by hand, from where the last one will have ended. Modes, factors and the feed of what is typed stay as they
+    /// are, and have no part in it.
+    MoveBy {
+        /// 0, 1, 2 for X, Y, Z; 3 for the filament.
+        axis: usize,
+        /// How far; negative is towards lower positions.
+        distance: Mm,
+        /// How fast.
+        speed: MmPerS,
+    },
     /// A heater's target; 0 is off.
     SetTemperature(Heater, Celsius),
     /// The part fan's speed, 0 ..= 1.

@@ -9,6 +9,7 @@
 
 mod board;
 mod connect;
+mod console;
 mod event;
 mod fan;
 mod homing;
@@ -25,7 +26,8 @@ use std::collections::VecDeque;
 use units::{Seconds, Ticks};
 use wire::Command;
 
-pub use event::{EVENTS_MAX, Event, PhaseName, Request, ScheduledMove};
+pub use console::CONSOLE_BYTES_MAX;
+pub use event::{EVENTS_MAX, Event, PhaseName, Request, ScheduledMove, SpeedProfile};
 pub use job::{JobOptions, JobStatus};
 
 use self::{
@@ -45,8 +47,6 @@ use crate::{
 const IDLE_WAKE: Seconds = Seconds(1.0);
 /// A restart that had no effect is tried this often in all: its one message may be lost on a bad line.
 const RESTARTS_MAX: u32 = 5;
-/// The longest text that may be typed at once, in bytes.
-pub const CONSOLE_BYTES_MAX: usize = 16 * 1024;
 
 #[derive(Debug)]
 enum Stage {

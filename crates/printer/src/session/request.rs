@@ -4,7 +4,8 @@ use units::Seconds;
 use wire::Command;
 
 use super::{
-    CONSOLE_BYTES_MAX, Session, Stage,
+    Session, Stage,
+    console::Console,
     event::Request,
     job::{Job, JobOptions, JobState, JobStatus},
     ready::{Failure, Ready},
@@ -30,7 +31,10 @@ impl Session {
         let Stage::Ready(ready) = &mut self.stage else { return Err(ErrorCode::NotConnected.into()) };
         ready.last_active = now;
         match request {
-            Request::Gcode(text) => ready.type_gcode(&text)?,
+            Request::Gcode(text) => ready.idle_console()?.type_text(text)?,
+            Request::MoveBy { axis, distance, speed } => {
+                ready.idle_console()?.move_by(axis, distance, speed)?;
+            }
             Request::SetTemperature(heater, target) => {
                 ready.thermal.set_target(heater, target, &mut ready.board, now)?;
             }
@@ -153,6 +157,17 @@ impl Session {
         }
     }
 
+    /// The speed and flow factors of what is planned from now on, 1 is as written: the job's, or those of what is typed.
+    pub fn factors(&self) -> [f64; 2] {
+        match &self.stage {
+            Stage::Ready(ready) => {
+                let source = ready.job.as_ref().map_or(&ready.console.source, |job| &job.source);
+                [source.interpreter.speed_factor(), source.interpreter.flow_factor()]
+            }
+            _ => [1.0, 1.0],
+        }
+    }
+
     /// The part fan's speed, 0 ..= 1.
     pub fn fan_speed(&self) -> f64 {
         match &self.stage {
@@ -171,20 +186,15 @@ fn is_emergency(text: &str) -> bool {
 }
 
 impl Ready {
-    fn type_gcode(&mut self, text: &str) -> Result<(), PrinterError> {
-        if !matches!(self.job_status(), JobStatus::None | JobStatus::Paused) {
-            return Err(ErrorCode::BusyPrinting.into());
+    /// The console, unless a job is what is carried out.
+    fn idle_console(&mut self) -> Result<&mut Console, PrinterError> {
+        match self.job_status() {
+            JobStatus::None | JobStatus::Paused => Ok(&mut self.console),
+            _ => Err(ErrorCode::BusyPrinting.into()),
         }
-        if text.len() > CONSOLE_BYTES_MAX || text.len() >= self.console.wants() {
-            let detail = format!("more than {CONSOLE_BYTES_MAX} bytes at once");
-            return Err(PrinterError::new(ErrorCode::InvalidGcode, detail));
-        }
-        self.console.feed(text.as_bytes());
-        self.console.feed(b"\n");
-        Ok(())
     }
 
     fn sources(&mut self) -> impl Iterator<Item = &mut crate::planner::Source> {
-        core::iter::once(&mut self.console).chain(self.job.as_mut().map(|job| &mut job.source))
+        core::iter::once(&mut self.console.source).chain(self.job.as_mut().map(|job| &mut job.source))
     }
 }

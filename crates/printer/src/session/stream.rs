@@ -210,13 +210,13 @@ impl MotionStream {
         Some(run)
     }
 
-    /// Drops what has not been sent: the motors were stopped by something else.
-    pub(super) fn abandon(&mut self, board: &mut Board) {
+    /// Drops what has not been sent: the motors were stopped by something else. Whether there was a run.
+    pub(super) fn abandon(&mut self, board: &mut Board) -> bool {
         for motor in 0..MOTORS {
             board.link.forget_motion(motor as u8);
         }
         self.timeline.clear();
-        self.run = None;
+        self.run.take().is_some()
     }
 
     /// How much motion the board has, in seconds from its clock: up to the first step that it has not acknowledged,

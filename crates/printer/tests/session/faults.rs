@@ -110,7 +110,7 @@ fn a_move_that_no_driver_can_step() {
     let mut bench = Setup::config(fine, finer).ready();
     bench.home();
     bench.gcode("G1 X5 F12000");
-    bench.failed(ErrorCode::StepRateTooHigh, Some(2));
+    bench.failed(ErrorCode::StepRateTooHigh, Some(1));
     assert!(bench.error().detail.contains("stepper_x at 200 mm/s"), "{}", bench.error());
     bench.gcode("G1 X5 F3000");
     bench.assert_position(5.0, 150.0, 0.5);

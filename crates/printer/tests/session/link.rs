@@ -3,9 +3,11 @@
 use std::fmt::Write;
 
 use printer::{
-    error::ErrorCode,
-    session::{JobStatus, PhaseName, Request},
+    error::{ErrorCode, PrinterError},
+    session::{JobStatus, PhaseName, Request, Session},
 };
+use rand_pcg::{Pcg32, rand_core::Rng};
+use units::Seconds;
 use virtual_printer::BoardProfile;
 
 use crate::{
@@ -149,6 +151,45 @@ fn a_port_with_nobody_there() {
     bench.failed(ErrorCode::BoardSilent, None);
     let refused = bench.request(Request::EmergencyStop).unwrap_err();
     assert_eq!(refused.code, ErrorCode::NotConnected);
+}
+
+/// What a session makes of a port whose other end answers each message with this, and after how many seconds.
+fn judged(mut answer: impl FnMut() -> Vec<u8>) -> (PrinterError, f64) {
+    let config = printer::config::parse(crate::machine::CONFIG).0.unwrap();
+    let mut now = Seconds(100.0);
+    let mut session = Session::new(config, now);
+    let mut out = Vec::new();
+    loop {
+        assert!(now < Seconds(120.0), "nothing came of it");
+        let wake = session.poll(now, &mut out);
+        if session.phase() != PhaseName::Identifying {
+            break;
+        }
+        now = wake.max(now + Seconds(0.001));
+        if !core::mem::take(&mut out).is_empty() {
+            session.receive(&answer(), now);
+        }
+    }
+    assert_eq!(session.phase(), PhaseName::Failed);
+    (session.error().unwrap().clone(), now.0 - 100.0)
+}
+
+#[test]
+fn what_answers_wrongly_is_told_apart_in_time() {
+    let mut chance = Pcg32::new(5, 5);
+    let mut noise = move || (0..40).map(|_| chance.next_u32() as u8).collect::<Vec<u8>>();
+    let text = |text: &'static str| move || text.as_bytes().to_vec();
+    // A sound block without content: an acknowledgement.
+    let block = wire::block::Block::new(1, &[]).as_bytes().to_vec();
+    for ((error, after_s), code) in [
+        (judged(Vec::new), ErrorCode::BoardSilent),
+        (judged(text("echo:Unknown command: \"\"\nok\n")), ErrorCode::WrongFirmware),
+        (judged(&mut noise), ErrorCode::BoardUnreadable),
+        (judged(|| block.clone()), ErrorCode::WrongFirmware),
+    ] {
+        assert_eq!(error.code, code, "{error}");
+        assert!(after_s < 6.0, "{error} after {after_s} s");
+    }
 }
 
 #[test]

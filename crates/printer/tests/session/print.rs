@@ -126,6 +126,41 @@ fn dwells_waits_and_outputs_come_at_their_print_time() {
     assert!(ends.contains(&to_50.end.0) && to_0.start > to_50.end);
 }
 
+#[test]
+fn the_speed_of_each_move_adds_up_to_its_length_and_goes_on_in_the_next() {
+    let mut bench = Setup::default().ready();
+    let travel = lines(40, |n| format!("G1 X{} Y{} E0.3 F{}\n", 60 + n % 7, 60 + n % 5, 1200 + 60 * n));
+    bench.print(
+        &(squares(2).replace(END, "") + &travel + "G4 P500\nG1 X60 Y60\nG2 X60 Y60 I10 J0 E2\n" + END),
+    );
+    bench.job_done();
+    let freq = f64::from(bench.printer.profile().clock.0);
+    let mut before: Option<ScheduledMove> = None;
+    let mut turned = 0;
+    for made in moves(&bench) {
+        let speed = made.speed;
+        let corners = [
+            (made.start.0, speed.start.0),
+            (speed.cruise_from.0, speed.cruise.0),
+            (speed.cruise_until.0, speed.cruise.0),
+            (made.end.0, speed.end.0),
+        ];
+        let driven: f64 =
+            corners.windows(2).map(|w| (w[1].0 - w[0].0) as f64 / freq * 0.5 * (w[0].1 + w[1].1)).sum();
+        let way: [f64; 3] = core::array::from_fn(|axis| made.to[axis] - made.from[axis]);
+        let length = way.iter().map(|d| d * d).sum::<f64>().sqrt();
+        // Each corner's clock is rounded to a tick.
+        let rounding = 4.0 * speed.cruise.0 / freq;
+        assert!((driven - length).abs() <= rounding, "{made:?}: {driven} mm of {length} mm");
+        let entry = before.filter(|last| last.end == made.start).map_or(0.0, |last| last.speed.end.0);
+        assert!((speed.start.0 - entry).abs() < 1e-9, "{made:?} after {entry} mm/s");
+        turned += u32::from(entry > 0.0);
+        before = Some(made);
+    }
+    assert_eq!(before.unwrap().speed.end.0, 0.0);
+    assert!(turned > 40, "{turned} corners were passed at speed");
+}
+
 fn run_end(event: &Event) -> Option<u64> {
     if let Event::RunEnded { at } = event { Some(at.0) } else { None }
 }
@@ -201,6 +236,22 @@ fn faster_and_thicker_takes_effect_in_the_middle() {
     assert!(counts[3] > plain.1[3] * 11 / 10 && counts[3] < plain.1[3] * 3 / 2);
     // Nonsense changes nothing.
     bench.ask(Request::SetSpeedFactor(f64::NAN));
+    assert_eq!(bench.session.factors(), [2.0, 1.5]);
+}
+
+#[test]
+fn factors_are_those_of_the_lines_that_were_read() {
+    let mut bench = Setup::default().ready();
+    bench.gcode("M220 S50");
+    assert_eq!(bench.session.factors(), [0.5, 1.0]);
+    // A job begins with its own.
+    bench.start(&format!("{START}M220 S80\nM221 S95\nG1 X10 F6000\nG1 X100 E1 F600\n{END}"));
+    assert_eq!(bench.session.factors(), [1.0, 1.0]);
+    bench.line(10);
+    assert_eq!(bench.session.factors(), [0.8, 0.95]);
+    bench.job_over();
+    bench.job_done();
+    assert_eq!(bench.session.factors(), [0.5, 1.0]);
 }
 
 #[test]

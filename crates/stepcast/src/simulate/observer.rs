@@ -144,6 +144,7 @@ impl Observer {
             }
             Event::Identified { .. }
             | Event::Phase(_)
+            | Event::RunBroken { .. }
             | Event::Temperature { .. }
             | Event::Annotation(_)
             | Event::Object(_)
@@ -154,7 +155,7 @@ impl Observer {
     }
 
     fn take_move(&mut self, scheduled: &ScheduledMove, printer: &mut VirtualPrinter<Tally>) {
-        let &ScheduledMove { line, start, end, from, to, homing } = scheduled;
+        let &ScheduledMove { line, start, end, from, to, homing, .. } = scheduled;
         let tally = printer.recorder_mut();
         if let Some(at) = self.new_run.take() {
             tally.digest.expect_run(at, homing);

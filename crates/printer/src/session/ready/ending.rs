@@ -35,7 +35,7 @@ impl Ready {
     /// What was typed and not yet done is not done, and the console knows where the machine will stand.
     fn forget_console(&mut self) {
         self.console.clear();
-        self.planner.correct(&mut self.console);
+        self.planner.correct(&mut self.console.source);
     }
 
     fn switch_off(&mut self, now: Seconds) {
@@ -153,7 +153,7 @@ impl Ready {
         }
         self.last_active = now;
         self.console.clear();
-        self.planner.adopt(&mut self.console);
+        self.planner.adopt(&mut self.console.source);
         self.events.push(Event::Paused);
     }
 
@@ -168,7 +168,7 @@ impl Ready {
         self.held = Held::default();
         self.planner.drop_barrier();
         self.console.clear();
-        self.planner.adopt(&mut self.console);
+        self.planner.adopt(&mut self.console.source);
         self.events.push(event);
     }
 

@@ -14,6 +14,7 @@ use self::waiting::{Held, Wait};
 use super::{
     board::Board,
     connect,
+    console::Console,
     event::{Event, Events},
     inbox::{self, Message},
     job::{Job, JobStatus, PROGRESS_INTERVAL},
@@ -51,7 +52,7 @@ pub(super) struct Ready {
     pub(super) planner: Planner,
     pub(super) stream: MotionStream,
     pub(super) thermal: Thermal,
-    pub(super) console: Source,
+    pub(super) console: Console,
     /// Gives nothing: for homing, and for coming to rest.
     silence: Source,
     pub(super) job: Option<Job>,
@@ -66,8 +67,8 @@ impl Ready {
     pub(super) fn new(config: PrinterConfig, mut board: Board, now: Seconds) -> Result<Self, PrinterError> {
         let mut planner = Planner::new(&config, board.clock)?;
         let thermal = Thermal::start(&config, &mut board, now);
-        let mut console = Source::new(machine::gcode_settings(&config));
-        planner.adopt(&mut console);
+        let mut console = Console::new(Source::new(machine::gcode_settings(&config)));
+        planner.adopt(&mut console.source);
         Ok(Self {
             config,
             board,
@@ -242,7 +243,7 @@ impl Ready {
     fn source_mut(&mut self) -> &mut Source {
         match &mut self.job {
             Some(job) if job.is_active() => &mut job.source,
-            _ => &mut self.console,
+            _ => &mut self.console.source,
         }
     }
 

@@ -8,8 +8,8 @@ use crate::{
     error::{ErrorCode, PrinterError},
     planner::{Barrier, ExtrusionPermit, Planned, TimedAction},
     session::{
-        event::{Event, ScheduledMove},
-        job::JobState,
+        event::{Event, ScheduledMove, SpeedProfile},
+        job::{Job, JobState},
         stream::Due,
     },
 };
@@ -41,7 +41,7 @@ impl Ready {
             let source = match &mut self.job {
                 _ if homing || stopping => &mut self.silence,
                 Some(job) if job.is_active() => &mut job.source,
-                _ => &mut self.console,
+                _ => &mut self.console.source,
             };
             let planned = match self.planner.next(source) {
                 Ok(planned) => planned,
@@ -91,6 +91,7 @@ impl Ready {
                     end: at(planned.end_time()),
                     from: planned.from,
                     to: planned.to,
+                    speed: SpeedProfile::new(&planned, at),
                     homing: run.homing,
                 };
                 self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
@@ -171,6 +172,10 @@ impl Ready {
         let clock_now = self.board.clock_at(now);
         let printing = self.job.as_ref().is_some_and(|job| job.state == JobState::Printing);
         let homing = matches!(self.wait, Wait::Homing { .. });
+        let is_typed = !homing && !self.job.as_ref().is_some_and(Job::is_active);
+        if is_typed && self.console.advance() {
+            return true;
+        }
         let planned_until = self.planner.planned_until();
         if self.planner.is_at_rest()
             || printing && !homing && !self.stream.is_starving(planned_until, clock_now, &self.board)

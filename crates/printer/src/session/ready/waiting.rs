@@ -129,8 +129,7 @@ impl Ready {
             }
             Ok(Wish::Abandon) => {
                 let position_mm = homing.position_mm();
-                self.planner.abandon_run();
-                self.stream.abandon(&mut self.board);
+                self.break_run(now);
                 self.planner.set_axis(axis, position_mm, false);
             }
             Ok(Wish::Done) => {
@@ -141,9 +140,17 @@ impl Ready {
             }
             Ok(Wish::Cancelled) => {
                 self.wait = Wait::Nothing;
-                self.planner.correct(&mut self.console);
+                self.planner.correct(&mut self.console.source);
             }
             Err(error) => self.homing_failed(error, now),
+        }
+    }
+
+    /// The motors have been stopped by something else: what was planned for them is forgotten.
+    fn break_run(&mut self, now: Seconds) {
+        self.planner.abandon_run();
+        if self.stream.abandon(&mut self.board) {
+            self.events.push(Event::RunBroken { at: self.board.clock_at(now) });
         }
     }
 
@@ -167,8 +174,7 @@ impl Ready {
         if let Wait::Homing { axis, line, .. } = &self.wait {
             let axis = axis.axis;
             error = error.at_line(line.0);
-            self.planner.abandon_run();
-            self.stream.abandon(&mut self.board);
+            self.break_run(now);
             let position = self.planner.position()[axis];
             self.planner.set_axis(axis, position, false);
         }

@@ -1,0 +1,86 @@
+//! Whether a motor can step as fast as a move wants it to.
+//!
+//! Knows speeds and the motors' step distances, not positions. What a motor's driver can follow is bounded by the length
+//! of its pulses and by the board's clock ([`machine::motor_speeds_max`]).
+
+use gcode::LineNumber;
+use motion::{Limits, PlannedMove};
+use units::{Hertz, MmPerS};
+
+use crate::{
+    config::PrinterConfig,
+    error::{ErrorCode, PrinterError},
+    machine::{self, EXTRUDER, MOTOR_NAMES, MOTORS},
+    planner::Position,
+};
+
+/// A speed that is beyond the bound by no more than this share of it is on it: rounding.
+const SLACK: f64 = 1e-9;
+
+/// What each motor can follow, as the speed of its axis.
+#[derive(Clone, Copy, Debug)]
+pub struct StepRates {
+    speed_max: [MmPerS; MOTORS],
+}
+
+impl StepRates {
+    /// Of a machine on a board with this clock.
+    pub fn new(config: &PrinterConfig, clock: Hertz) -> Self {
+        Self { speed_max: machine::motor_speeds_max(config, clock) }
+    }
+
+    /// Refuses what no driver can step, by the highest speed that the limits leave. An extruder that moves along with
+    /// the axes is judged when its move is planned: its junctions slow it down.
+    pub fn judge_request(
+        &self,
+        from: Position,
+        to: Position,
+        feed: MmPerS,
+        limits: &Limits,
+        line: LineNumber,
+    ) -> Result<(), PrinterError> {
+        let delta: [f64; MOTORS] = core::array::from_fn(|motor| to[motor] - from[motor]);
+        let travel = delta[..EXTRUDER].iter().map(|d| d * d).sum::<f64>().sqrt();
+        let (length, speed, motors) = if travel > 0.0 {
+            (travel, feed.min(limits.max_velocity), 0..EXTRUDER)
+        } else {
+            let speed = feed.min(limits.extruder.max_extrude_only_velocity);
+            (delta[EXTRUDER].abs(), speed, EXTRUDER..MOTORS)
+        };
+        for motor in motors {
+            let share = delta[motor].abs() / length;
+            let z_bound = if motor == 2 { limits.max_z_velocity } else { speed };
+            if share > 0.0 && z_bound.min(speed * share) > self.speed_max[motor] * (1.0 + SLACK) {
+                return Err(too_fast(motor, speed * share, line.0));
+            }
+        }
+        Ok(())
+    }
+
+    /// The highest feed, not above `feed`, that every motor can follow however straight the path is. For moves that are
+    /// faster than the file says because the user wants it so: they are slowed down, not refused.
+    pub fn slowed(&self, from: Position, to: Position, feed: MmPerS) -> MmPerS {
+        let delta: [f64; MOTORS] = core::array::from_fn(|motor| (to[motor] - from[motor]).abs());
+        let travel = delta[..EXTRUDER].iter().map(|d| d * d).sum::<f64>().sqrt();
+        let length = if travel > 0.0 { travel } else { delta[EXTRUDER] };
+        (0..MOTORS)
+            .filter(|&motor| delta[motor] > 0.0)
+            .fold(feed, |feed, motor| feed.min(self.speed_max[motor] * (length / delta[motor])))
+    }
+
+    /// Refuses a planned move in which a motor would have to step faster than it can.
+    pub fn judge_planned(&self, planned: &PlannedMove) -> Result<(), PrinterError> {
+        for motor in 0..MOTORS {
+            let speed = MmPerS(planned.cruise_velocity * planned.direction[motor].abs());
+            if speed > self.speed_max[motor] * (1.0 + SLACK) {
+                return Err(too_fast(motor, speed, planned.tag));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn too_fast(motor: usize, speed: MmPerS, line: u32) -> PrinterError {
+    let detail = format!("{} at {:.0} mm/s", MOTOR_NAMES[motor], speed.0);
+    PrinterError::new(ErrorCode::StepRateTooHigh, detail).at_line(line)
+}

@@ -1,0 +1,29 @@
+// The browser tests: one headless Chromium, one test at a time, against the built page.
+import { defineConfig } from '@playwright/test';
+import { BROWSER_ADVICE, browserArguments, findBrowser } from '../scripts/lib/browser.mjs';
+
+const executablePath = findBrowser();
+if (!executablePath) throw new Error(`Missing: ${BROWSER_ADVICE}`);
+
+export default defineConfig({
+  testDir: './specs',
+  outputDir: './test-results',
+  // Two cores and software GL: a second browser would only make both late.
+  workers: 1,
+  fullyParallel: false,
+  forbidOnly: Boolean(process.env['CI']),
+  timeout: 60_000,
+  expect: { timeout: 20_000 },
+  reporter: [['list']],
+  use: {
+    browserName: 'chromium',
+    headless: true,
+    locale: 'en-GB',
+    actionTimeout: 15_000,
+    navigationTimeout: 30_000,
+    // Without pictures of every moment: taking them would be most of the work here.
+    trace: { mode: 'retain-on-failure', screenshots: false, snapshots: true, sources: false },
+    screenshot: 'only-on-failure',
+    launchOptions: { executablePath, args: browserArguments() },
+  },
+});

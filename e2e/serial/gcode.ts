@@ -1,0 +1,56 @@
+// Files for the specs: real slices, shortened, and what their text alone says. Knows no planner.
+import { readFileSync } from 'node:fs';
+import { sample } from '../pages/panel.ts';
+
+/** A move to the next layer, as the slicer of the small sample writes it. */
+const LAYER = /^G1 Z\d/;
+/** Where the slicer's own end begins. */
+const END = '; Filament-specific end gcode';
+
+/** The first layers of a real slice with its own start and end: heating, homing, retractions, cooling down. */
+export function slice(layers: number): string {
+  const lines = readFileSync(sample('test-part-small.gcode'), 'utf8').split('\n');
+  // The first is a lift in the start G-code.
+  const starts = lines.flatMap((line, index) => (LAYER.test(line) ? [index] : [])).slice(1);
+  const end = lines.findIndex((line) => line.startsWith(END));
+  const cut = starts[layers];
+  if (cut === undefined || end < cut) throw new Error(`the sample has no ${layers} layers and an end`);
+  return [...lines.slice(0, cut), ...lines.slice(end)].join('\n');
+}
+
+/** The text up to and with the first line that begins so. */
+export function upTo(gcode: string, command: string): string {
+  const lines = gcode.split('\n');
+  const index = lines.findIndex((line) => line.startsWith(command));
+  if (index < 0) throw new Error(`the file has no ${command}`);
+  return lines.slice(0, index + 1).join('\n');
+}
+
+/** Where X, Y and Z stand at the end of a text, in mm, after G0, G1, G28, G90 and G91 alone. */
+export function endOf(gcode: string): [number, number, number] {
+  const place: [number, number, number] = [0, 0, 0];
+  let isRelative = false;
+  const step = (word: string): void => {
+    const axis = 'XYZ'.indexOf(word.charAt(0));
+    if (axis < 0) return;
+    const value = Number(word.slice(1));
+    place[axis] = isRelative ? (place[axis] ?? 0) + value : value;
+  };
+  for (const line of gcode.split('\n')) {
+    const [command = '', ...words] = line.replace(/;.*/, '').trim().split(/\s+/);
+    if (command === 'G90' || command === 'G91') isRelative = command === 'G91';
+    else if (command === 'G28') place.fill(0);
+    else if (command === 'G0' || command === 'G1') words.forEach(step);
+  }
+  return place;
+}
+
+/** A print of XY moves alone that heats both heaters without waiting, rests after homing, and takes at least so long. */
+export function strolling(seconds: number): string {
+  const speedMmS = 100;
+  const sides = Math.ceil((seconds * speedMmS) / 100);
+  const corners = ['X150 Y50', 'X150 Y150', 'X50 Y150', 'X50 Y50'];
+  const moves = Array.from({ length: sides }, (_, side) => `G1 ${corners[side % corners.length]}`);
+  const start = ['M140 S60', 'M104 S200', 'G28', 'G4 P8000', 'G1 X50 Y50 Z5 F6000'];
+  return [...start, ...moves, 'M104 S0', 'M140 S0', ''].join('\n');
+}

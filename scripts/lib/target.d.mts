@@ -1,0 +1,3 @@
+export declare const root: string;
+export declare function targetFolder(): string;
+export declare function stepcast(): string;
