@@ -62,6 +62,9 @@ const AXIS_STOPPED: &str =
 /// A job that ran has come to its end.
 const JOB_ENDED: &str = "The print has ended: the moves before that place were made, the motors stand still, the heaters \
                          and the fan are off.";
+/// The board holds its motion.
+const HELD: &str = "The head rests on its path, no step was lost and the position is known. Heaters stay as they \
+                    were set, and the board goes on watching them. Nothing goes on by itself.";
 /// Contact is gone, so nothing can be claimed but what the board does by itself.
 const ON_ITS_OWN: &str = "The printer is on its own: its board switches the heaters off within 3 seconds without \
                           orders and stops when its queue of moves is empty. It may have lost its position.";
@@ -207,6 +210,12 @@ catalogue! {
     BoardShutdown, "board-shutdown":
         "The board stopped for a reason of its own", ALL_STOPPED,
         "Deal with the reason it gives, restart the board and home.";
+    HeldHostAway, "held-host-away":
+        "The computer did not reach the printer in time, so the board brought its motion to rest", HELD,
+        "Keep the page open and the computer awake. Look at the print, then resume it or cancel it.";
+    HeldQueueDry, "held-queue-dry":
+        "Moves did not reach the printer in time, so the board brought its motion to rest", HELD,
+        "Close other heavy programs, connect without a hub. Look at the print, then resume it or cancel it.";
     BusyPrinting, "busy-printing":
         "That cannot be done while a print is running", REFUSED,
         "Pause or cancel the print first.";

@@ -85,6 +85,11 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
         self.core.has_tasks()
     }
 
+    /// The motion clock at a clock that is not before the last call; docs/motion-clock.md says how it runs.
+    pub fn motion_clock(&self, clock: Clock32) -> Clock32 {
+        self.core.hold.clock.motion(clock)
+    }
+
     /// Why the board is shut down, if it is.
     pub const fn shutdown_reason(&self) -> Option<ShutdownReason> {
         self.core.halt.reason()

@@ -20,7 +20,8 @@ pub enum Lane {
     Immediate,
     /// Ahead of motion: configuration, heaters, queries.
     Control,
-    /// What one stepper does, by its number below [`MOTION_LANES_MAX`]. Lanes are merged by [`Outgoing::due`].
+    /// What one stepper does, by its number below [`MOTION_LANES_MAX`], or something else that follows the motion
+    /// clock. Lanes are merged by [`Outgoing::due`].
     Motion(u8),
 }
 

@@ -6,6 +6,7 @@
 //!
 //! Units: host time in seconds of any monotonic clock, the board's clock in ticks.
 
+mod clocks;
 mod lanes;
 mod message;
 mod rtt;
@@ -20,6 +21,7 @@ use units::{Hertz, Seconds, Ticks};
 use wire::block::{BLOCK_BYTES_MAX, BLOCK_BYTES_MIN, Deframer, Frame};
 
 pub use self::{
+    clocks::Clocks,
     lanes::{CONTROL_MESSAGES_MAX, IMMEDIATE_MESSAGES_MAX, MOTION_MESSAGES_MAX},
     message::{Lane, MOTION_LANES_MAX, Outgoing, SCHEDULE_AHEAD_TICKS_MAX},
 };
@@ -241,9 +243,10 @@ impl Link {
         LinkStats { round_trip: self.window.round_trip.smoothed_s().map(Seconds), ..self.stats }
     }
 
-    /// Appends what is to be sent now, and says when to call again if nothing arrives before. `clock_now` is the
-    /// board's clock as far as it is known.
-    pub fn poll(&mut self, now: Seconds, clock_now: Ticks, out: &mut Vec<u8>) -> Option<Seconds> {
+    /// Appends what is to be sent now, and says when to call again if nothing arrives before. `clocks` are the
+    /// board's as far as they are known: what waits in motion lanes is due by the motion clock.
+    pub fn poll(&mut self, now: Seconds, clocks: impl Into<Clocks>, out: &mut Vec<u8>) -> Option<Seconds> {
+        let clocks = clocks.into();
         let before = out.len();
         let wake = if self.window.is_adopted() {
             if let Some(resent) = self.window.resend(now.0, out) {
@@ -251,9 +254,9 @@ impl Link {
                 self.stats.timeouts += u64::from(resent.timed_out);
                 self.stats.bytes_retransmitted += resent.bytes as u64;
             }
-            self.moves.release(clock_now);
-            let held = self.send_blocks(now, clock_now, out);
-            self.next_wake(now, clock_now, held)
+            self.moves.release(clocks);
+            let held = self.send_blocks(now, clocks, out);
+            self.next_wake(now, clocks, held)
         } else {
             self.probe(now, out)
         };
@@ -272,18 +275,18 @@ impl Link {
     }
 
     /// Sends blocks while the window has room.
-    fn send_blocks(&mut self, now: Seconds, clock_now: Ticks, out: &mut Vec<u8>) -> Held {
+    fn send_blocks(&mut self, now: Seconds, clocks: Clocks, out: &mut Vec<u8>) -> Held {
         // Every turn sends a block or ends the loop, and the window bounds the blocks.
         for _ in 0..WINDOW_BLOCKS_IMMEDIATE_MAX {
             let Some((payload_bytes, immediate_only)) = self.room_on_the_line() else { break };
             let gate = Gate {
-                clock: clock_now,
-                horizon: Ticks(clock_now.0.saturating_add(self.horizon.0)),
+                clocks,
+                horizon: Ticks(clocks.motion.0.saturating_add(self.horizon.0)),
                 payload_bytes,
                 immediate_only,
             };
             let draft = self.lanes.draft(&gate, &self.moves);
-            if draft.is_empty() || !self.goes_now(&draft, clock_now) {
+            if draft.is_empty() || !self.goes_now(&draft, clocks.motion) {
                 return Held { starved: draft.starved, due: draft.motion.due, crowded: false };
             }
             // Short blocks may hold one long message. The immediate lane waits for nobody.
@@ -326,28 +329,29 @@ impl Link {
         self.horizon.saturating_sub(self.clock.ticks_in(Seconds(FILL_WAIT_S))).max(urgent)
     }
 
-    fn goes_now(&self, draft: &Draft, clock_now: Ticks) -> bool {
+    fn goes_now(&self, draft: &Draft, motion_now: Ticks) -> bool {
         let lead = self.urgent_lead(draft.starved);
         draft.full
             || draft.is_urgent()
-            || draft.motion.due.is_some_and(|due| due.saturating_sub(lead) <= clock_now)
+            || draft.motion.due.is_some_and(|due| due.saturating_sub(lead) <= motion_now)
     }
 
     /// When something is to be done, if nothing arrives before.
-    fn next_wake(&self, now: Seconds, clock_now: Ticks, held: Held) -> Option<f64> {
+    fn next_wake(&self, now: Seconds, clocks: Clocks, held: Held) -> Option<f64> {
         let resend = self.window.resend_due_s();
         if held.crowded || self.room_on_the_line().is_none() {
             return resend;
         }
         let send = if held.starved {
             let urgent = held.due.map(|due| due.saturating_sub(self.urgent_lead(true)));
-            let released = self.moves.next_release();
-            let released = released.map(|clock| clock + self.clock.ticks_in(Seconds(ENTRIES_WAIT_S)));
-            urgent.into_iter().chain(released).chain(self.lanes.control_clock(clock_now)).min()
+            let urgent = urgent.and_then(|clock| clocks.until_motion(clock));
+            let released = self.moves.next_release(clocks);
+            let released = released.map(|ahead| ahead + self.clock.ticks_in(Seconds(ENTRIES_WAIT_S)));
+            urgent.into_iter().chain(released).chain(self.lanes.until_control(clocks)).min()
         } else {
-            self.lanes.next_clock(self.urgent_lead(false))
+            self.lanes.until_next(self.urgent_lead(false), clocks)
         };
-        let send = send.map(|clock| now.0 + self.clock.duration_of(clock.saturating_sub(clock_now)).0);
+        let send = send.map(|ahead| now.0 + self.clock.duration_of(ahead).0);
         resend.into_iter().chain(send).min_by(f64::total_cmp)
     }
 }

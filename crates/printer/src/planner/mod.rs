@@ -151,6 +151,12 @@ impl Planner {
         self.guard.set_homed(axis, homed);
     }
 
+    /// Says where the machine stands, at rest. What is homed stays so.
+    pub fn stand_at(&mut self, position: Position) {
+        debug_assert!(self.is_at_rest(), "a position is only set at rest");
+        self.position = position;
+    }
+
     /// Makes a source continue from where the machine is: before its first line, and whenever another source moved. Its
     /// offsets are forgotten.
     pub fn adopt(&mut self, source: &mut Source) {

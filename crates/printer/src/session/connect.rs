@@ -12,6 +12,7 @@ use super::{
     event::{Event, PhaseName},
     inbox::{self, Message},
     layout::Layout,
+    motion_time::MotionTime,
 };
 use crate::{
     clock_sync::{ClockRequest, ClockSync},
@@ -215,6 +216,7 @@ impl Connecting {
             dictionary,
             layout,
             losses: Losses::default(),
+            motion: MotionTime::default(),
         };
         if let Some(window) = window {
             board.link.set_receive_window(window as usize);

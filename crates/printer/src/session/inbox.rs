@@ -6,6 +6,7 @@ use wire::{
     dictionary::{Dictionary, Received},
 };
 
+use super::motion_time::MotionReport;
 use crate::link::Link;
 
 /// A message from the board, without borrowed bytes.
@@ -18,6 +19,8 @@ pub(super) enum Message {
     Endstop { oid: u8, homing: bool, pin_value: bool },
     Trigger { oid: u8, can_trigger: bool, reason: u8 },
     Analog { oid: u8, next_clock: Clock32, sum: u16 },
+    Motion(MotionReport),
+    Queue { oid: u8, position: i32 },
     Shutdown { reason: u16 },
     Starting,
 }
@@ -67,9 +70,10 @@ fn message(response: &Response<'_>) -> Option<Message> {
             Message::Shutdown { reason: static_string_id }
         }
         Response::Starting {} => Message::Starting,
-        Response::Stats { .. }
-        | Response::IdentifyResponse { .. }
-        | Response::MotionState { .. }
-        | Response::StepperQueue { .. } => return None,
+        Response::MotionState { clock, motion, rate, state, reason } => {
+            Message::Motion(MotionReport::new(clock, motion, rate, state, reason))
+        }
+        Response::StepperQueue { oid, pos, .. } => Message::Queue { oid, position: pos },
+        Response::Stats { .. } | Response::IdentifyResponse { .. } => return None,
     })
 }

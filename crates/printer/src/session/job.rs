@@ -50,6 +50,9 @@ pub enum JobStatus {
     Paused,
     /// It comes to rest to be ended.
     Ending,
+    /// The board holds its motion at rest on the path, whatever it belongs to: it goes on, or is ended, at the user's
+    /// word.
+    Held,
 }
 
 /// How the machine stood when a job was paused.

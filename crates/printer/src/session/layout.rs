@@ -5,7 +5,7 @@
 use units::{Oid, Seconds};
 use wire::{
     Command,
-    dictionary::{Dictionary, DictionaryError},
+    dictionary::{Dictionary, DictionaryError, MOTION_CLOCK},
     messages::CommandKind,
 };
 
@@ -44,8 +44,22 @@ const NEEDED: &[CommandKind] = &[
     CommandKind::UpdateDigitalOut,
 ];
 
-/// How long a heater stays on without being refreshed, as the board itself watches it.
-pub(crate) const HEATER_MAX_DURATION: Seconds = Seconds(3.0);
+/// What a board needs besides so that its motion can be held: the host's lease on motion, and what ends a hold.
+const MOTION_NEEDED: &[CommandKind] = &[
+    CommandKind::MotionLease,
+    CommandKind::MotionEnd,
+    CommandKind::MotionResume,
+    CommandKind::MotionGetState,
+    CommandKind::MotionDrop,
+    CommandKind::MotionTie,
+    CommandKind::StepperGetQueue,
+];
+/// The version of the motion clock that is spoken here.
+const MOTION_VERSION: f64 = 1.0;
+
+/// How long a heater stays on without being refreshed, as the board itself watches it. On a board that can hold its
+/// motion, the machine file may ask for a little more: else there is little time in which there is anything to hold.
+const HEATER_MAX_DURATION: Seconds = Seconds(3.0);
 
 /// A motor's objects.
 #[derive(Clone, Copy, Debug)]
@@ -97,6 +111,8 @@ pub(super) struct Layout {
     pub(super) extruder: Option<HeaterOids>,
     pub(super) bed: Option<HeaterOids>,
     pub(super) fan: Option<Output>,
+    /// Whether the board can hold its motion (docs/motion-clock.md). The part fan then follows the motion clock.
+    pub(super) has_motion_clock: bool,
     /// The commands that set all this up, without `finalize_config`.
     pub(super) commands: Vec<Command<'static>>,
     /// The CRC-32 of those commands: a board that was set up by the same says so.
@@ -108,6 +124,7 @@ struct Builder<'a> {
     clock_freq: f64,
     commands: Vec<Command<'static>>,
     oids: u8,
+    heater_max_duration: Seconds,
 }
 
 impl Builder<'_> {
@@ -156,7 +173,7 @@ impl Builder<'_> {
         let pin = u32::from(self.pin(&config.sensor_pin)?);
         let sensor = self.oid();
         self.commands.push(Command::ConfigAnalogIn { oid: sensor.0, pin });
-        let power = self.output(&config.heater_pin, Some(config.pwm_cycle_time), HEATER_MAX_DURATION)?;
+        let power = self.output(&config.heater_pin, Some(config.pwm_cycle_time), self.heater_max_duration)?;
         Ok(HeaterOids { sensor, power })
     }
 
@@ -202,7 +219,12 @@ impl Layout {
         let wrong =
             |error: DictionaryError| PrinterError::new(ErrorCode::DictionaryIncomplete, error.to_string());
         dictionary.require(NEEDED).map_err(wrong)?;
-        let mut builder = Builder { dictionary, clock_freq, commands: Vec::new(), oids: 0 };
+        let has_motion_clock = dictionary.number(MOTION_CLOCK) == Some(MOTION_VERSION)
+            && dictionary.require(MOTION_NEEDED).is_ok();
+        let heater_max_duration =
+            if has_motion_clock { config.printer.heater_max_duration } else { HEATER_MAX_DURATION };
+        let mut builder =
+            Builder { dictionary, clock_freq, commands: Vec::new(), oids: 0, heater_max_duration };
         let mut steppers = [None; MOTORS];
         let [x, y, z] = &config.steppers;
         let endstops = [
@@ -223,6 +245,9 @@ impl Layout {
             Some(fan) => Some(builder.output(&fan.pin, Some(fan.cycle_time), Seconds::ZERO)?),
             None => None,
         };
+        if let Some(fan) = fan.filter(|_| has_motion_clock) {
+            builder.commands.push(Command::MotionTie { oid: fan.oid.0 });
+        }
         let mut commands = vec![Command::AllocateOids { count: builder.oids }];
         commands.append(&mut builder.commands);
         let mut bytes = Vec::new();
@@ -230,7 +255,7 @@ impl Layout {
             dictionary.encode(command, &mut bytes).map_err(wrong)?;
         }
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes);
-        Ok(Self { steppers, endstops, extruder, bed, fan, commands, crc })
+        Ok(Self { steppers, endstops, extruder, bed, fan, has_motion_clock, commands, crc })
     }
 }
 
@@ -276,9 +301,20 @@ mod tests {
             "SetDigitalOutPwmCycle { oid: 17, cycle_ticks: 1200000 }",
             "ConfigDigitalOut { oid: 18, pin: 18, value: 0, default_value: 0, max_duration: 0 }",
             "SetDigitalOutPwmCycle { oid: 18, cycle_ticks: 120000 }",
+            "MotionTie { oid: 18 }",
         ];
         assert_eq!(text, expected, "{text:#?}");
         assert!(layout.steppers[1].is_some_and(|oids| oids.invert_dir));
+    }
+
+    #[test]
+    fn plain_boards_are_told_nothing_of_a_motion_clock() {
+        let config = crate::config::parse(SAMPLE).0.expect("a machine");
+        let board = BoardProfile::rp2040().plain();
+        let dictionary = Dictionary::parse(&board.description().compressed()).expect("a dictionary");
+        let layout = Layout::new(&config, &dictionary, f64::from(board.clock.0)).unwrap();
+        assert!(!layout.has_motion_clock);
+        assert!(!layout.commands.iter().any(|command| matches!(command, Command::MotionTie { .. })));
     }
 
     #[test]

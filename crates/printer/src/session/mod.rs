@@ -16,6 +16,8 @@ mod homing;
 mod inbox;
 mod job;
 mod layout;
+mod lease;
+mod motion_time;
 mod ready;
 mod request;
 mod stream;
@@ -324,10 +326,11 @@ impl Session {
         }
     }
 
-    /// The board's clock now, as far as it is known.
-    pub fn board_clock(&self, now: Seconds) -> Option<Ticks> {
+    /// The board's motion clock now, as far as it is known: that of moves and runs. It is the board's clock, less the
+    /// time that motion was held.
+    pub fn motion_clock(&self, now: Seconds) -> Option<Ticks> {
         match &self.stage {
-            Stage::Ready(ready) => Some(ready.clock_at(now)),
+            Stage::Ready(ready) => Some(ready.board.motion_at(now)),
             _ => None,
         }
     }

@@ -1,7 +1,8 @@
-//! The stream of motion: step commands from the planner onto the board's clock, just far enough ahead.
+//! The stream of motion: step commands from the planner onto the board's motion clock, just far enough ahead.
 //!
 //! A run of motion gets a start clock when its first move is planned; from then on every step is that clock plus the
-//! plan's own ticks, so that the same run gives the same intervals whenever it starts. Knows nothing of G-code.
+//! plan's own ticks, so that the same run gives the same intervals whenever it starts. All clocks here are the board's
+//! motion clock, unless they say otherwise: a hold delays everything alike. Knows nothing of G-code.
 
 use std::collections::VecDeque;
 
@@ -11,7 +12,11 @@ use units::{Seconds, Ticks};
 use wire::Command;
 
 use super::{board::Board, event::ScheduledMove};
-use crate::{link::Lane, machine::MOTORS, planner::TimedAction};
+use crate::{
+    link::Lane,
+    machine::MOTORS,
+    planner::{Position, TimedAction},
+};
 
 /// How much motion is planned and sent ahead of the board's clock.
 pub(super) const HORIZON: Seconds = Seconds(4.0);
@@ -59,8 +64,15 @@ pub(super) struct MotionStream {
     pending: [Pending; MOTORS],
     timeline: VecDeque<(Ticks, Due)>,
     enabled: [bool; MOTORS],
-    /// The clock at which each motor's driver was last switched: the next switch must come later.
+    /// The hardware clock at which each motor's driver was last switched: the next switch must come later.
     switched: [Ticks; MOTORS],
+    /// The level of the direction pin for each motor's next steps: high counts up.
+    forward: [bool; MOTORS],
+    /// Where the board counts each motor to be once all of its steps have been made.
+    counts: [i32; MOTORS],
+    /// The same at the start of the run, and the machine's position there.
+    counts_at_start: [i32; MOTORS],
+    position_at_start: Position,
     /// Print time of the runs that have ended.
     elapsed: Seconds,
 }
@@ -102,23 +114,30 @@ impl MotionStream {
     }
 
     /// A run starts as soon as the link allows.
-    pub(super) fn start_run(&mut self, board: &Board, now: Seconds, homing: bool) -> Run {
+    pub(super) fn start_run(&mut self, position: Position, board: &Board, now: Seconds, homing: bool) -> Run {
         // A driver that has just been switched off is first on again.
         let switched = self.switched.iter().fold(Ticks(0), |last, &clock| last.max(clock));
-        let start = board.run_clock(now).max(switched + board.ticks(ENABLE_LEAD * 2.0));
+        let ready = switched.saturating_sub(board.clock_at(now)) + board.ticks(ENABLE_LEAD * 2.0);
+        let start = board.run_clock(now).max(board.motion_at(now) + ready);
         let run = Run { start, end: None, homing };
         self.run = Some(run);
+        self.counts_at_start = self.counts;
+        self.position_at_start = position;
         self.pending = [Pending { reset: true, forward: None }; MOTORS];
         run
     }
 
     /// Switches a motor's driver on before its first step at `at`.
-    fn enable(&mut self, motor: usize, at: Ticks, board: &mut Board) {
+    fn enable(&mut self, motor: usize, at: Ticks, board: &mut Board, now: Seconds) {
         if self.enabled[motor] {
             return;
         }
         self.enabled[motor] = true;
-        let clock = at.saturating_sub(board.ticks(ENABLE_LEAD));
+        let mut clock = board.hardware_of(at, now).saturating_sub(board.ticks(ENABLE_LEAD));
+        if !board.motion.is_steady() {
+            // Held where the motor is about to make its first step, which then waits too.
+            clock = clock.max(board.output_clock(now));
+        }
         self.switched[motor] = clock;
         Self::switch_driver(motor, true, clock, board);
     }
@@ -150,13 +169,14 @@ impl MotionStream {
     }
 
     /// A motor's next step command, of the run that is being made.
-    pub(super) fn push(&mut self, command: &StepCommand, board: &mut Board) {
+    pub(super) fn push(&mut self, command: &StepCommand, board: &mut Board, now: Seconds) {
         let Some(run) = self.run else { return };
         let motor = command.motor;
         let Some(oids) = board.layout.steppers[motor] else { return };
         let oid = oids.stepper.0;
         let (interval, count, add) = match command.kind {
             StepCommandKind::SetDir { forward } => {
+                self.forward[motor] = forward != oids.invert_dir;
                 // It travels with the steps that it is for.
                 self.pending[motor].forward = Some(forward);
                 return;
@@ -166,7 +186,7 @@ impl MotionStream {
         // A single step after a long rest has an interval modulo 2³²: its own clock is what counts.
         let first = if count == 1 { command.end } else { command.start + Ticks(u64::from(interval)) };
         let due = run.start + first;
-        self.enable(motor, due, board);
+        self.enable(motor, due, board, now);
         let Pending { reset, forward } = core::mem::take(&mut self.pending[motor]);
         if reset {
             board.motion(motor, &Command::ResetStepClock { oid, clock: run.start.low().0 }, due, None);
@@ -175,6 +195,8 @@ impl MotionStream {
             let dir = u8::from(forward != oids.invert_dir);
             board.motion(motor, &Command::SetNextStepDir { oid, dir }, due, None);
         }
+        let made = i32::from(count);
+        self.counts[motor] = self.counts[motor].wrapping_add(if self.forward[motor] { made } else { -made });
         let end = run.start + command.end;
         board.motion(motor, &Command::QueueStep { oid, interval, count, add }, due, Some(end));
     }
@@ -219,17 +241,31 @@ impl MotionStream {
         self.run.take().is_some()
     }
 
-    /// How much motion the board has, in seconds from its clock: up to the first step that it has not acknowledged,
-    /// or to the end of what has been generated. `None` where no run is being made.
-    pub(super) fn queued_on_board(
+    /// The board says where it counts a motor to be, at rest.
+    pub(super) const fn set_count(&mut self, motor: usize, count: i32) {
+        self.counts[motor] = count;
+    }
+
+    /// Where the machine stands, in mm, from where the board counts its motors to be: the present run was broken off.
+    pub(super) fn position_of(
         &self,
-        generated_until: Option<Ticks>,
-        clock_now: Ticks,
+        counts: [i32; MOTORS],
+        steps_mm: [f64; MOTORS],
         board: &Board,
-    ) -> Option<Seconds> {
+    ) -> Position {
+        core::array::from_fn(|motor| {
+            let made = f64::from(counts[motor].wrapping_sub(self.counts_at_start[motor]));
+            let is_inverted = board.layout.steppers[motor].is_some_and(|oids| oids.invert_dir);
+            let made = if is_inverted { -made } else { made };
+            self.position_at_start[motor] + made * steps_mm[motor]
+        })
+    }
+
+    /// The clock up to which the board has all steps of the run: that of the first which it has not acknowledged, or
+    /// the end of what has been generated. `None` where no run is being made.
+    pub(super) fn covered(&self, generated_until: Option<Ticks>, board: &Board) -> Option<Ticks> {
         let run = self.run?;
         let generated = run.end.or(generated_until.map(|until| run.start + until))?;
-        let until = board.link.motion_covered().map_or(generated, |covered| covered.min(generated));
-        Some(board.clock.duration_of(until.saturating_sub(clock_now)))
+        Some(board.link.motion_covered().map_or(generated, |covered| covered.min(generated)))
     }
 }

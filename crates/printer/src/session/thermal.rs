@@ -122,6 +122,13 @@ impl Thermal {
         }
     }
 
+    /// The board has dropped the fan's orders.
+    pub(super) const fn forget_fan_orders(&mut self) {
+        if let Some(fan) = &mut self.fan {
+            fan.forget_orders();
+        }
+    }
+
     /// Sends what has waited for its time.
     pub(super) fn poll(&mut self, board: &mut Board, now: Seconds) {
         if let Some(fan) = &mut self.fan {

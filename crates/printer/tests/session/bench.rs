@@ -26,13 +26,17 @@ const LOG_MAX: usize = 100_000;
 /// One pulse: when, which motor, which way.
 pub(crate) type Pulse = (u64, usize, bool);
 
-/// Every pulse of every motor.
+/// Every pulse of every motor, on the motion clock; that is the board's as long as nothing is held.
 #[derive(Debug, Default)]
-pub(crate) struct Pulses(pub(crate) Vec<Pulse>);
+pub(crate) struct Pulses(pub(crate) Vec<Pulse>, Ticks);
 
 impl Recorder for Pulses {
     fn step(&mut self, motor: usize, at: Ticks, forward: bool, _count: i64) {
-        self.0.push((at.0, motor, forward));
+        self.0.push(((at - self.1).0, motor, forward));
+    }
+
+    fn motion_behind(&mut self, behind: Ticks) {
+        self.1 = behind;
     }
 }
 

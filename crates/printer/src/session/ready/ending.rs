@@ -8,7 +8,7 @@ use crate::{
     planner::ExtrusionPermit,
     session::{
         event::Event,
-        job::{Job, JobState, Paused, RETURN_FEED},
+        job::{Job, JobState, JobStatus, Paused, RETURN_FEED},
     },
 };
 
@@ -65,6 +65,9 @@ impl Ready {
     }
 
     pub(in crate::session) fn cancel(&mut self, now: Seconds) -> Result<(), PrinterError> {
+        if self.cancel_held(now) {
+            return Ok(());
+        }
         let is_console_busy = self.is_console_busy();
         match &mut self.job {
             Some(job) if matches!(job.state, JobState::Failing(_)) => return Ok(()),
@@ -78,8 +81,11 @@ impl Ready {
         Ok(())
     }
 
-    /// Goes back to where the job was paused, and on.
+    /// Goes on with what is held; else goes back to where the job was paused, and on.
     pub(in crate::session) fn resume(&mut self, now: Seconds) -> Result<(), PrinterError> {
+        if self.resume_held()? {
+            return Ok(());
+        }
         let Some(paused) = self.job.as_ref().and_then(|job| job.paused) else {
             return Err(PrinterError::new(ErrorCode::NoJob, "no job is paused"));
         };
@@ -128,7 +134,10 @@ impl Ready {
     /// uses is switched off.
     pub(super) fn rest(&mut self, now: Seconds) {
         if !self.is_at_rest() || !matches!(self.wait, Wait::Nothing) {
-            self.last_active = now;
+            // Motion that is held waits for the user, as a pause does.
+            if self.hold_status() != Some(JobStatus::Held) {
+                self.last_active = now;
+            }
             return;
         }
         let state = self.job.as_ref().map(|job| job.state.clone());

@@ -4,13 +4,17 @@
 //! with before anything that follows.
 
 mod ending;
+mod hold;
 mod plan;
 mod waiting;
 
 use gcode::LineNumber;
-use units::{Seconds, Ticks};
+use units::Seconds;
 
-use self::waiting::{Held, Wait};
+use self::{
+    hold::{Calls, Hold},
+    waiting::{Held, Wait},
+};
 use super::{
     board::Board,
     connect,
@@ -18,6 +22,8 @@ use super::{
     event::{Event, Events},
     inbox::{self, Message},
     job::{Job, JobStatus, PROGRESS_INTERVAL},
+    layout::StepperOids,
+    lease::Lease,
     stream::{Due, MotionStream},
     thermal::Thermal,
 };
@@ -61,6 +67,10 @@ pub(super) struct Ready {
     held: Held,
     pub(super) events: Events,
     pub(super) last_active: Seconds,
+    lease: Lease,
+    /// Motion is held.
+    hold: Option<Hold>,
+    calls: Calls,
 }
 
 impl Ready {
@@ -69,6 +79,7 @@ impl Ready {
         let thermal = Thermal::start(&config, &mut board, now);
         let mut console = Console::new(Source::new(machine::gcode_settings(&config)));
         planner.adopt(&mut console.source);
+        let lease = Lease::new(&config);
         Ok(Self {
             config,
             board,
@@ -82,22 +93,27 @@ impl Ready {
             held: Held::default(),
             events: Events::default(),
             last_active: now,
+            lease,
+            hold: None,
+            calls: Calls::default(),
         })
     }
 
     /// What the job is doing.
     pub(super) fn job_status(&self) -> JobStatus {
-        self.job.as_ref().map_or(JobStatus::None, Job::status)
+        let of_job = || self.job.as_ref().map_or(JobStatus::None, Job::status);
+        self.hold_status().unwrap_or_else(of_job)
     }
 
     /// Motion that the board has, in seconds, while a run is being made and more of it is to come.
     pub(super) fn motion_queued(&self, now: Seconds) -> Option<Seconds> {
-        let clock_now = self.board.clock_at(now);
+        let motion_now = self.board.motion_at(now);
         let run = self.stream.run()?;
-        if run.homing || run.end.is_some() || clock_now < run.start {
+        if run.homing || run.end.is_some() || motion_now < run.start || !self.board.motion.is_steady() {
             return None;
         }
-        self.stream.queued_on_board(self.planner.generated_until(), clock_now, &self.board)
+        let covered = self.stream.covered(self.planner.generated_until(), &self.board)?;
+        Some(self.board.clock.duration_of(covered.saturating_sub(motion_now)))
     }
 
     /// Whether what was typed is still being carried out.
@@ -137,6 +153,8 @@ impl Ready {
             Message::Shutdown { reason } => return Err(Failure::Shutdown(self.shutdown_error(reason))),
             Message::Starting => return Err(Failure::Lost(ErrorCode::BoardRestarted.into())),
             Message::Config { .. } => {}
+            Message::Motion(report) => self.on_motion(&report, now),
+            Message::Queue { oid, position } => self.on_queue(oid, position),
             Message::Position { .. } | Message::Endstop { .. } | Message::Trigger { .. } => {
                 self.on_homing_message(message, now);
             }
@@ -155,6 +173,13 @@ impl Ready {
     }
 
     fn on_homing_message(&mut self, message: Message, now: Seconds) {
+        if let Message::Position { oid, position } = message {
+            let is_it = |oids: &Option<StepperOids>| oids.is_some_and(|oids| oids.stepper.0 == oid);
+            let motor = self.board.layout.steppers.iter().position(is_it);
+            if let Some(motor) = motor {
+                self.stream.set_count(motor, position);
+            }
+        }
         let Wait::Homing { axis, .. } = &mut self.wait else { return };
         let result = match message {
             Message::Position { oid, position } => axis.on_position(oid, position),
@@ -176,23 +201,35 @@ impl Ready {
             return Err(Failure::Lost(ErrorCode::LinkLost.into()));
         }
         self.thermal.check_silence(now).map_err(Failure::Stop)?;
+        self.calls.note(now);
         connect::ask_clock(&mut self.board, now);
         self.board.note_losses(now);
-        let clock_now = self.board.clock_at(now);
-        while let Some(due) = self.stream.pop_due(clock_now) {
-            self.on_due(due, now);
-        }
         self.thermal.poll(&mut self.board, now);
-        self.stream.take_finished(clock_now, &self.board);
-        self.advance_wait(now);
-        self.pump(now)?;
-        self.rest(now);
-        let clock_now = self.board.clock_at(now);
-        let link_wake = self.board.link.poll(now, clock_now, out);
+        if !self.lease.is_in_doubt(&mut self.board, now) {
+            self.go_on(now)?;
+        }
+        let link_wake = self.board.link.poll(now, self.board.clocks(now), out);
         let busy = self.stream.run().is_some() || !matches!(self.wait, Wait::Nothing);
         let own_wake = now + if busy { PUMP_INTERVAL } else { IDLE_INTERVAL };
         let wake = own_wake.min(self.board.sync.next_wake());
         Ok(link_wake.map_or(wake, |link| link.min(wake)))
+    }
+
+    /// Does what is due by the motion clock, and what follows from it.
+    fn go_on(&mut self, now: Seconds) -> Result<(), Failure> {
+        let motion_now = self.board.motion_at(now);
+        while let Some(due) = self.stream.pop_due(motion_now) {
+            self.on_due(due, now);
+        }
+        if let Some(run) = self.stream.take_finished(motion_now, &self.board) {
+            self.lease.end(run, &mut self.board);
+        }
+        self.advance_wait(now);
+        self.advance_hold(now)?;
+        self.pump(now)?;
+        self.renew_lease(now);
+        self.rest(now);
+        Ok(())
     }
 
     fn on_due(&mut self, due: Due, now: Seconds) {
@@ -245,10 +282,5 @@ impl Ready {
             Some(job) if job.is_active() => &mut job.source,
             _ => &mut self.console.source,
         }
-    }
-
-    /// The clock of the end of everything that has been planned.
-    pub(super) fn clock_at(&self, now: Seconds) -> Ticks {
-        self.board.clock_at(now)
     }
 }

@@ -22,14 +22,16 @@ impl Ready {
     pub(super) fn pump(&mut self, now: Seconds) -> Result<(), Failure> {
         self.planner.guard.extrusion = self.extrusion_permit();
         for _ in 0..PLAN_ITEMS_MAX {
-            let clock_now = self.board.clock_at(now);
+            let clock_now = self.board.motion_at(now);
             if !self.stream.wants_more(self.planner.generated_until(), clock_now, &self.board) {
                 return Ok(());
             }
             // A run that has been planned is first made to its end.
             let run_planned = self.planner.is_at_rest() && self.stream.run().is_some();
             let homing = matches!(self.wait, Wait::Homing { .. });
-            if run_planned || !(homing || matches!(self.wait, Wait::Nothing)) {
+            // Nor is there a place on the clock for a new one while motion is held.
+            let may_start = self.stream.run().is_some() || self.board.motion.is_steady();
+            if !may_start || run_planned || !(homing || matches!(self.wait, Wait::Nothing)) {
                 return Ok(());
             }
             let stopping = self.job.as_ref().is_some_and(|job| {
@@ -76,9 +78,10 @@ impl Ready {
         match planned {
             Planned::RunStarted(position) => {
                 let homing = matches!(self.wait, Wait::Homing { .. });
-                let run = self.stream.start_run(&self.board, now, homing);
+                let run = self.stream.start_run(position, &self.board, now, homing);
                 if let Wait::Homing { axis, .. } = &mut self.wait {
-                    axis.run_started(run.start, &mut self.board, now);
+                    let start = self.board.hardware_of(run.start, now);
+                    axis.run_started(start, &mut self.board, now);
                 }
                 self.events.push(Event::RunStarted { at: run.start, position });
             }
@@ -97,14 +100,14 @@ impl Ready {
                 self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
                 self.events.push(Event::Move(scheduled));
             }
-            Planned::Steps(command) => self.stream.push(&command, &mut self.board),
+            Planned::Steps(command) => self.stream.push(&command, &mut self.board, now),
             Planned::Timed { at, line, action } => self.on_timed(at, line, action, now),
             Planned::RunEnded(at) => {
                 if let Some(run) = self.stream.run() {
                     let end = run.start + self.board.ticks(at);
                     self.stream.end_run(end);
                     if let Wait::Homing { axis, .. } = &mut self.wait {
-                        axis.run_planned(end);
+                        axis.run_planned(self.board.hardware_of(end, now));
                     }
                     self.events.push(Event::RunEnded { at: end });
                 }
@@ -169,7 +172,7 @@ impl Ready {
 
     /// The source has nothing more at hand; `true` when the planner should be asked again all the same.
     pub(super) fn on_drained(&mut self, now: Seconds) -> bool {
-        let clock_now = self.board.clock_at(now);
+        let clock_now = self.board.motion_at(now);
         let printing = self.job.as_ref().is_some_and(|job| job.state == JobState::Printing);
         let homing = matches!(self.wait, Wait::Homing { .. });
         let is_typed = !homing && !self.job.as_ref().is_some_and(Job::is_active);

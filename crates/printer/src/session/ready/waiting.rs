@@ -150,7 +150,7 @@ impl Ready {
     fn break_run(&mut self, now: Seconds) {
         self.planner.abandon_run();
         if self.stream.abandon(&mut self.board) {
-            self.events.push(Event::RunBroken { at: self.board.clock_at(now) });
+            self.events.push(Event::RunBroken { at: self.board.motion_at(now) });
         }
     }
 

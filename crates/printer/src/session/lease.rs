@@ -1,0 +1,150 @@
+//! The host's lease on motion (docs/motion-clock.md): while a run of motion is made, the board is told several times a
+//! second up to where it has all steps and until when the host counts as alive. A host that is held up beyond that
+//! finds the print at rest on its path instead of lost.
+//!
+//! Homing has no lease: its triggers have a time-out of their own. Nor has a run of which the board never has enough to
+//! come to rest on: a lease that covers too little would hold it at once.
+//!
+//! Knows no G-code and no jobs. A pause that holds instead of running the queue empty would attach here: `motion_hold`
+//! and the lease's end, then the same way back as after a stall.
+
+use units::{Seconds, Ticks};
+use wire::Command;
+
+use super::{board::Board, stream::Run};
+use crate::config::PrinterConfig;
+
+/// The host counts as alive for so long after each renewal.
+const ALIVE: Seconds = Seconds(2.0);
+/// How often the lease is renewed.
+const RENEW: Seconds = Seconds(0.2);
+/// The shortest ramp between the full rate and rest …
+const RAMP_MIN: Seconds = Seconds(0.3);
+/// … which adds at most this part of a motor's acceleration to the plan's own.
+const ADDED_PART: f64 = 1.0 / 3.0;
+/// A lease begins with this much more motion than what coming to rest takes: renewals take their time.
+const COVER_SPARE: Seconds = Seconds(0.5);
+/// The board says four times a second how its motion goes while there is a lease. Without a word for this long, it may
+/// have begun to hold.
+const SILENCE_MAX: Seconds = Seconds(0.7);
+/// Questions that are not answered are asked again after this long.
+const ASK_AGAIN: Seconds = Seconds(0.15);
+
+/// What the board was last told.
+#[derive(Clone, Copy, Debug)]
+struct Told {
+    at: Seconds,
+    covered: Ticks,
+    /// Hardware clock.
+    alive: Ticks,
+    has_end: bool,
+}
+
+/// The motion that may be vouched for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cover {
+    /// The board has all steps up to this motion clock.
+    pub(super) until: Ticks,
+    /// Motion comes to rest there by itself.
+    pub(super) is_end: bool,
+}
+
+/// The lease on the run that is being made.
+#[derive(Debug)]
+pub(super) struct Lease {
+    ramp: Seconds,
+    told: Option<Told>,
+    asked: Seconds,
+}
+
+impl Lease {
+    /// Of a machine. A ramp slows a speed v by v/ramp, whatever the plan does at the time.
+    pub(super) fn new(config: &PrinterConfig) -> Self {
+        let printer = &config.printer;
+        let mut limits = vec![
+            (printer.max_velocity.0, printer.max_accel.0),
+            (printer.max_z_velocity.0, printer.max_z_accel.0),
+        ];
+        limits.extend(
+            config
+                .extruder
+                .as_ref()
+                .map(|extruder| (extruder.max_extrude_only_velocity.0, extruder.max_extrude_only_accel.0)),
+        );
+        let ramps = limits.iter().map(|(velocity, accel)| velocity / (accel * ADDED_PART));
+        let ramp = Seconds(ramps.fold(RAMP_MIN.0, f64::max));
+        Self { ramp, told: None, asked: Seconds(f64::NEG_INFINITY) }
+    }
+
+    /// The time between the full rate and rest.
+    pub(super) const fn ramp(&self) -> Seconds {
+        self.ramp
+    }
+
+    /// Whether the board has a lease.
+    pub(super) const fn is_on(&self) -> bool {
+        self.told.is_some()
+    }
+
+    /// The board says nothing of its motion for too long: asks it. Whether that is so.
+    pub(super) fn is_in_doubt(&mut self, board: &mut Board, now: Seconds) -> bool {
+        let silence = board.clock_at(now).saturating_sub(board.motion.known_until());
+        if self.told.is_none() || silence < board.ticks(SILENCE_MAX) {
+            return false;
+        }
+        board.motion.doubt();
+        if now - self.asked >= ASK_AGAIN {
+            self.asked = now;
+            board.control(&Command::MotionGetState {});
+        }
+        true
+    }
+
+    /// Begins the lease, renews it, or says where it ends.
+    pub(super) fn renew(&mut self, run: Run, cover: Cover, board: &mut Board, now: Seconds) {
+        if run.homing {
+            return;
+        }
+        let Some(told) = self.told else {
+            let motion_now = board.motion_at(now).max(run.start);
+            let needed = board.ticks(Seconds(self.ramp.0 / 2.0) + COVER_SPARE);
+            if board.motion.is_steady() && cover.until >= motion_now + needed {
+                board.motion.trust(board.clock_at(now));
+                self.tell(cover, board, now);
+            }
+            return;
+        };
+        let ends = cover.is_end && !told.has_end;
+        // Renewed behind its end, it would be one that covers nothing.
+        let lasts = told.has_end && board.hardware_of(told.covered, now) < told.alive;
+        if ends || !lasts && now - told.at >= RENEW {
+            self.tell(cover, board, now);
+        }
+    }
+
+    /// Tells the board what is covered, whatever it was told before.
+    pub(super) fn tell(&mut self, cover: Cover, board: &mut Board, now: Seconds) {
+        let covered = self.told.map_or(cover.until, |told| told.covered.max(cover.until));
+        let alive = board.clock_at(now) + board.ticks(ALIVE);
+        let ramp = board.ticks(self.ramp).0 as u32;
+        board.control(&Command::MotionLease { covered: covered.low().0, alive: alive.low().0, ramp });
+        let had_end = self.told.is_some_and(|told| told.has_end);
+        if cover.is_end && !had_end {
+            board.control(&Command::MotionEnd { clock: cover.until.low().0 });
+        }
+        self.told = Some(Told { at: now, covered, alive, has_end: cover.is_end || had_end });
+    }
+
+    /// The run has been made to its end: nothing is left over for the time until the next.
+    pub(super) fn end(&mut self, run: Run, board: &mut Board) {
+        let Some(told) = self.told.take() else { return };
+        if let Some(end) = run.end.filter(|_| !told.has_end) {
+            board.control(&Command::MotionEnd { clock: end.low().0 });
+        }
+    }
+
+    /// The board has dropped its queue and the lease with it.
+    pub(super) const fn forget(&mut self) {
+        self.told = None;
+    }
+}

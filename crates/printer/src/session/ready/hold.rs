@@ -1,0 +1,300 @@
+//! Motion that the board has brought to rest on its path because its host was held up: nothing is lost, and nothing goes
+//! on before the user says so.
+//!
+//! The way on is with the very next step; the way out drops the board's queue and reads where the motors stand. Heaters
+//! are the host's business meanwhile, as ever: a board that gets no orders for a heater shuts down by itself, and then
+//! nothing is held any more.
+
+use units::{Celsius, Seconds, Ticks};
+use wire::Command;
+
+use super::{Failure, Ready};
+use crate::{
+    error::{ErrorCode, PrinterError},
+    link::SCHEDULE_AHEAD_TICKS_MAX,
+    machine::{self, MOTORS},
+    planner::ExtrusionPermit,
+    session::{
+        board::FAN_LANE,
+        event::Event,
+        job::{JobState, JobStatus},
+        lease::Cover,
+        motion_time::{HoldReason, MotionReport, MotionState},
+    },
+};
+
+/// Commands that are not answered are given again after this long.
+const ASK_AGAIN: Seconds = Seconds(0.3);
+/// A board that does not say where its motors stand for this long is given up.
+const ANSWER_MAX: Seconds = Seconds(3.0);
+/// A board that still holds so long after it was told to go on did not, or holds again.
+const RESUME_MAX: Seconds = Seconds(1.5);
+/// A nozzle that has cooled by this much since the hold, in °C, is heated first.
+const COOLED_MAX_C: f64 = 10.0;
+/// Motion that is to go on is covered by this much more than what speeding up and coming to rest take.
+const COVER_SPARE: Seconds = Seconds(0.3);
+/// A pause between two calls that is worth telling.
+const GAP_MIN: Seconds = Seconds(0.5);
+
+/// How far a hold is.
+#[derive(Clone, Debug)]
+enum Phase {
+    /// Motion slows down.
+    Slowing,
+    /// At rest: the user decides.
+    AtRest,
+    /// The user wants to go on; since when the board has been told, if it has.
+    Resuming(Option<Ticks>),
+    /// The user wants to end it: the queue is dropped, and each motor says where it stands.
+    Dropping { since: Seconds, asked: Seconds, counts: [Option<i32>; MOTORS] },
+    /// Nothing is queued any more; the motion clock is set going again.
+    Leaving { asked: Seconds },
+}
+
+/// Motion is held.
+#[derive(Clone, Debug)]
+pub(super) struct Hold {
+    phase: Phase,
+    reason: HoldReason,
+    /// The nozzle's temperature then, and whether it was hot enough to push filament.
+    nozzle: Option<Celsius>,
+    could_extrude: bool,
+}
+
+/// When the session was last called, and the longest pause since then that it has noticed.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Calls {
+    last: Option<Seconds>,
+    gap: Option<Seconds>,
+}
+
+impl Calls {
+    pub(super) fn note(&mut self, now: Seconds) {
+        let gap = self.last.replace(now).map(|last| now - last).filter(|&gap| gap >= GAP_MIN);
+        self.gap = gap.or(self.gap);
+    }
+}
+
+impl Ready {
+    /// What a hold makes of a job's status; nothing where there is none.
+    pub(super) fn hold_status(&self) -> Option<JobStatus> {
+        match self.hold.as_ref()?.phase {
+            Phase::AtRest => Some(JobStatus::Held),
+            Phase::Dropping { .. } => Some(JobStatus::Ending),
+            Phase::Slowing | Phase::Resuming(_) | Phase::Leaving { .. } => None,
+        }
+    }
+
+    /// The board's word on its motion.
+    pub(super) fn on_motion(&mut self, report: &MotionReport, now: Seconds) {
+        let Some(clock) = self.board.on_motion(report, now) else { return };
+        if report.state == MotionState::Running {
+            if self.board.motion.is_steady() {
+                self.hold_is_over();
+            }
+            return;
+        }
+        let at_rest = report.state == MotionState::Held;
+        let slows = at_rest || report.state == MotionState::Slowing;
+        let resume_max = self.board.ticks(RESUME_MAX);
+        match &mut self.hold {
+            None if slows && report.reason != HoldReason::None && self.lease.is_on() => {
+                self.begin_hold(report.reason);
+            }
+            // Perhaps the order to go on did not reach it, or it held again: either way the user is asked again.
+            Some(hold) if slows && report.reason != HoldReason::None => match hold.phase {
+                Phase::Resuming(Some(told)) if clock > told + resume_max => {
+                    self.begin_hold(report.reason);
+                }
+                _ => {}
+            },
+            _ => {}
+        }
+        if let Some(hold) = &mut self.hold
+            && at_rest
+            && matches!(hold.phase, Phase::Slowing)
+        {
+            hold.phase = Phase::AtRest;
+            let error = hold_error(hold.reason, self.calls.gap.take());
+            self.events.push(Event::Held(error));
+        }
+    }
+
+    fn begin_hold(&mut self, reason: HoldReason) {
+        self.hold = Some(Hold {
+            phase: Phase::Slowing,
+            reason,
+            nozzle: self.nozzle(),
+            could_extrude: self.extrusion_permit() == ExtrusionPermit::Allowed,
+        });
+    }
+
+    /// Motion goes at its full rate.
+    fn hold_is_over(&mut self) {
+        let Some(hold) = self.hold.take_if(|hold| !matches!(hold.phase, Phase::Dropping { .. })) else {
+            return;
+        };
+        if !matches!(hold.phase, Phase::Leaving { .. }) {
+            self.events.push(Event::Resumed);
+        }
+    }
+
+    fn nozzle(&self) -> Option<Celsius> {
+        self.thermal.heater(gcode::Heater::Tool(0)).and_then(crate::heater::Heater::temperature)
+    }
+
+    /// Goes on with what is held, with the very next step; `false` where nothing is.
+    pub(super) fn resume_held(&mut self) -> Result<bool, PrinterError> {
+        let nozzle = self.nozzle();
+        let permit = self.extrusion_permit();
+        let Some(hold) = self.hold.as_mut().filter(|hold| matches!(hold.phase, Phase::AtRest)) else {
+            return Ok(false);
+        };
+        let cooled = hold.nozzle.zip(nozzle).is_some_and(|(then, now)| (then - now).0 > COOLED_MAX_C);
+        let is_cold = permit != ExtrusionPermit::Allowed || cooled;
+        if let (true, true, Some(celsius)) = (hold.could_extrude, is_cold, nozzle) {
+            let detail = format!("the nozzle has cooled to {:.0} °C while the print was held", celsius.0);
+            return Err(PrinterError::new(ErrorCode::ColdExtrusion, detail));
+        }
+        hold.phase = Phase::Resuming(None);
+        Ok(true)
+    }
+
+    /// Ends what is held; `false` where nothing is.
+    pub(super) fn cancel_held(&mut self, now: Seconds) -> bool {
+        let Some(hold) = self.hold.as_mut().filter(|hold| matches!(hold.phase, Phase::AtRest)) else {
+            return false;
+        };
+        let asked = Seconds(f64::NEG_INFINITY);
+        hold.phase = Phase::Dropping { since: now, asked, counts: [None; MOTORS] };
+        self.thermal.all_off(&mut self.board, now);
+        self.board.control(&Command::MotionDrop {});
+        if let Some(job) = self.job.as_mut().filter(|job| !job.is_ending()) {
+            job.state = JobState::Cancelling;
+        }
+        true
+    }
+
+    /// A motor's answer to a dropped queue.
+    pub(super) fn on_queue(&mut self, oid: u8, position: i32) {
+        let Some(Hold { phase: Phase::Dropping { counts, .. }, .. }) = &mut self.hold else { return };
+        let motors = self.board.layout.steppers.iter().zip(counts);
+        for (_, count) in motors.filter(|(oids, _)| oids.is_some_and(|oids| oids.stepper.0 == oid)) {
+            *count = Some(position);
+        }
+    }
+
+    /// Goes on with a hold.
+    pub(super) fn advance_hold(&mut self, now: Seconds) -> Result<(), Failure> {
+        let Some(mut hold) = self.hold.take() else { return Ok(()) };
+        match &mut hold.phase {
+            Phase::Slowing | Phase::Resuming(Some(_)) => {}
+            Phase::AtRest => self.cool_down(now),
+            Phase::Resuming(told @ None) => {
+                if let Some(cover) = self.cover_to_resume(now) {
+                    self.lease.tell(cover, &mut self.board, now);
+                    let ramp = self.board.ticks(self.lease.ramp()).0 as u32;
+                    self.board.control(&Command::MotionResume { ramp });
+                    *told = Some(self.board.clock_at(now));
+                }
+            }
+            Phase::Dropping { since, asked, counts } => {
+                let all = core::array::from_fn(|motor| match self.board.layout.steppers[motor] {
+                    Some(_) => counts[motor],
+                    None => Some(0),
+                });
+                if let [Some(x), Some(y), Some(z), Some(e)] = all {
+                    self.stand_at(&[x, y, z, e], now);
+                    hold.phase = Phase::Leaving { asked: Seconds(f64::NEG_INFINITY) };
+                } else if now - *since > ANSWER_MAX {
+                    let detail = "it does not say where its motors stand";
+                    return Err(Failure::Stop(PrinterError::new(ErrorCode::LinkTimeout, detail)));
+                } else if now - *asked >= ASK_AGAIN {
+                    *asked = now;
+                    for oids in self.board.layout.steppers.into_iter().flatten() {
+                        self.board.control(&Command::StepperGetQueue { oid: oids.stepper.0 });
+                    }
+                }
+            }
+            Phase::Leaving { asked } => {
+                if now - *asked >= ASK_AGAIN {
+                    *asked = now;
+                    self.board.control(&Command::MotionResume { ramp: 0 });
+                }
+            }
+        }
+        self.hold = Some(hold);
+        Ok(())
+    }
+
+    /// Nobody decides for too long.
+    fn cool_down(&mut self, now: Seconds) {
+        if now - self.last_active >= self.config.idle_timeout.timeout && self.thermal.any_target() {
+            self.thermal.all_off(&mut self.board, now);
+            self.events.push(Event::Message("held for too long: heaters are off".into()));
+        }
+    }
+
+    /// What the board has, once it is enough to speed up on and come to rest again.
+    fn cover_to_resume(&self, now: Seconds) -> Option<Cover> {
+        let motion_now = self.board.motion_at(now);
+        let Some(run) = self.stream.run() else {
+            // It was held on the last steps of a run that was taken for done.
+            return Some(Cover { until: motion_now, is_end: true });
+        };
+        let cover = self.cover(run.end, now)?;
+        let enough = motion_now + self.board.ticks(self.lease.ramp() + COVER_SPARE);
+        (cover.is_end || cover.until >= enough).then_some(cover)
+    }
+
+    fn cover(&self, end: Option<Ticks>, now: Seconds) -> Option<Cover> {
+        let covered = self.stream.covered(self.planner.generated_until(), &self.board)?;
+        // A single row may last for minutes, which the board's clock cannot compare.
+        let until = covered.min(self.board.motion_at(now) + SCHEDULE_AHEAD_TICKS_MAX);
+        Some(Cover { until, is_end: end.is_some_and(|end| until >= end) })
+    }
+
+    /// Keeps the lease on the run that is being made.
+    pub(super) fn renew_lease(&mut self, now: Seconds) {
+        let may = matches!(self.hold, None | Some(Hold { phase: Phase::Resuming(Some(_)), .. }));
+        if let Some(run) = self.stream.run().filter(|_| may && self.board.layout.has_motion_clock)
+            && let Some(cover) = self.cover(run.end, now)
+        {
+            self.lease.renew(run, cover, &mut self.board, now);
+        }
+    }
+
+    /// The queue has been dropped: the machine stands where its motors' counts say.
+    fn stand_at(&mut self, counts: &[i32; MOTORS], now: Seconds) {
+        let steps_mm = machine::step_distances(&self.config).map(|distance| distance.0);
+        let position = self.stream.position_of(*counts, steps_mm, &self.board);
+        self.planner.abandon_run();
+        self.board.link.forget_motion(FAN_LANE as u8);
+        if self.stream.abandon(&mut self.board) {
+            self.events.push(Event::RunBroken { at: self.board.motion_at(now) });
+        }
+        for (motor, &count) in counts.iter().enumerate() {
+            self.stream.set_count(motor, count);
+        }
+        self.planner.stand_at(position);
+        self.console.clear();
+        self.planner.correct(&mut self.console.source);
+        self.thermal.forget_fan_orders();
+        self.thermal.set_fan(0.0, None, &mut self.board, now);
+        self.lease.forget();
+    }
+}
+
+/// What the user is told of a hold.
+fn hold_error(reason: HoldReason, gap: Option<Seconds>) -> PrinterError {
+    match (reason, gap) {
+        (HoldReason::HostAway, Some(gap)) => {
+            PrinterError::new(ErrorCode::HeldHostAway, format!("it was away for {:.1} s", gap.0))
+        }
+        (HoldReason::HostAway, None) => ErrorCode::HeldHostAway.into(),
+        (_, Some(gap)) => {
+            PrinterError::new(ErrorCode::HeldQueueDry, format!("the computer was away for {:.1} s", gap.0))
+        }
+        (_, None) => ErrorCode::HeldQueueDry.into(),
+    }
+}
