@@ -202,7 +202,7 @@ impl Host {
 
     fn clock(&self, now: Seconds) -> Option<(Ticks, f64)> {
         let freq = self.board.as_ref()?.clock_freq_hz;
-        Some((self.session.board_clock(now)?, freq)).filter(|_| freq > 0.0)
+        Some((self.session.motion_clock(now)?, freq)).filter(|_| freq > 0.0)
     }
 
     /// Where the head is now, going evenly through the present move.

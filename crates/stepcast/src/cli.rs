@@ -128,6 +128,9 @@ pub(crate) struct SimulateArgs {
     /// Print although lines have commands that are not known
     #[arg(long)]
     pub(crate) confirm_all: bool,
+    /// Resume a print that the board holds because its host was held up, as a user would; it ends there otherwise
+    #[arg(long)]
+    pub(crate) confirm_holds: bool,
 }
 
 #[derive(Args, Debug)]

@@ -14,6 +14,17 @@ pub struct Faults {
     pub bytes: ByteFaults,
     /// What fails, and when.
     pub failures: Vec<Failure>,
+    /// When the host is held up, for whoever runs the host: the printer itself does nothing about it.
+    pub host_stalls: Vec<HostStall>,
+}
+
+/// A host that does nothing for a while: its computer sleeps, or does something else. Bytes wait meanwhile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HostStall {
+    /// From when on.
+    pub at: Seconds,
+    /// For how long.
+    pub lasts: Seconds,
 }
 
 /// Probabilities per byte.
@@ -62,7 +73,7 @@ pub enum FailureKind {
 /// The items that [`Faults`] reads, for help texts.
 pub const FAULT_ITEMS: &str = "corrupt=P, drop=P, duplicate=P, delay=P (probability per byte), unplug@T, replug@T, \
     sensor-open=HEATER@T, sensor-short=HEATER@T, heater-dead=HEATER@T, heater-stuck-on=HEATER@T, \
-    endstop-stuck-on=AXIS@T, endstop-stuck-off=AXIS@T (T: seconds since power-up, 0 when left out)";
+    endstop-stuck-on=AXIS@T, endstop-stuck-off=AXIS@T, host-stall=SECONDS@T (T: seconds since power-up, 0 when left out)";
 
 /// Why a fault cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -116,9 +127,14 @@ fn parse_item(item: &str) -> Result<Faults, &'static str> {
         }
         return Ok(faults);
     }
-    let at = at.unwrap_or(Seconds::ZERO);
+    if name == "host-stall" {
+        let lasts = parse_duration(value.ok_or("the duration is missing")?)?;
+        faults.host_stalls.push(HostStall { at: at.unwrap_or(Seconds::ZERO), lasts });
+        return Ok(faults);
+    }
     let part =
         || value.filter(|value| !value.is_empty()).map(str::to_owned).ok_or("the part's name is missing");
+    let at = at.unwrap_or(Seconds::ZERO);
     let kind = match name {
         "unplug" | "replug" if value.is_some() => return Err("the cable has no name"),
         "unplug" => FailureKind::Unplug,
@@ -144,6 +160,10 @@ fn parse_time(text: &str) -> Result<Seconds, &'static str> {
     }
 }
 
+fn parse_duration(text: &str) -> Result<Seconds, &'static str> {
+    parse_time(text).map_err(|_| "the duration must be seconds")
+}
+
 fn parse_probability(text: &str) -> Result<f64, &'static str> {
     match text.parse::<f64>() {
         Ok(probability) if (0.0..=1.0).contains(&probability) => Ok(probability),
@@ -164,6 +184,7 @@ impl AddAssign for Faults {
         set(&mut self.bytes.duplicate, other.bytes.duplicate);
         set(&mut self.bytes.delay, other.bytes.delay);
         self.failures.extend(other.failures);
+        self.host_stalls.extend(other.host_stalls);
     }
 }
 
@@ -198,6 +219,8 @@ mod tests {
         ];
         let expected = expected.map(|(at, kind)| Failure { at: Seconds(at), kind });
         assert_eq!(faults.failures, expected);
+        faults += "host-stall=2.5@30".parse().expect("a fault");
+        assert_eq!(faults.host_stalls, [HostStall { at: Seconds(30.0), lasts: Seconds(2.5) }]);
     }
 
     #[test]
@@ -210,6 +233,8 @@ mod tests {
             ("unplug=x@3", "no name"),
             ("unplug@soon", "seconds"),
             ("fire", "no such fault"),
+            ("host-stall@3", "missing"),
+            ("host-stall=long@3", "must be seconds"),
             ("drop=nan", "between 0 and 1"),
         ] {
             let error = text.parse::<Faults>().expect_err(text).to_string();

@@ -127,7 +127,12 @@ pub enum UiEvent {
     },
     /// The job was paused, and the machine is at rest.
     Paused,
-    /// The job goes on.
+    /// The board brought motion to rest on its path and waits for the user: to resume or to cancel.
+    Held {
+        /// Why.
+        error: ErrorMessage,
+    },
+    /// The job, or what was held, goes on.
     Resumed,
     /// The job ended; all its moves have been made.
     JobDone,
@@ -166,6 +171,7 @@ impl UiEvent {
             Event::Message(text) => Self::Message { text: text.clone() },
             Event::Notice(diagnostic) => Self::Notice { finding: diagnostic.into() },
             Event::Paused => Self::Paused,
+            Event::Held(error) => Self::Held { error: error.into() },
             Event::Resumed => Self::Resumed,
             Event::JobDone => Self::JobDone,
             Event::JobCancelled => Self::JobCancelled,

@@ -78,6 +78,8 @@ pub enum JobPhase {
     Paused,
     /// It comes to rest to be ended.
     Ending,
+    /// The board holds its motion at rest on the path until the user decides.
+    Held,
 }
 
 impl From<JobStatus> for JobPhase {
@@ -88,6 +90,7 @@ impl From<JobStatus> for JobPhase {
             JobStatus::Pausing => Self::Pausing,
             JobStatus::Paused => Self::Paused,
             JobStatus::Ending => Self::Ending,
+            JobStatus::Held => Self::Held,
         }
     }
 }

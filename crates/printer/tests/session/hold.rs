@@ -230,7 +230,7 @@ fn a_stall_where_nothing_is_leased_ends_as_it_would_without() {
     // In a pause, and while it is heated.
     let (mut bench, from) = on_the_way(&setup(BoardProfile::rp2040()));
     bench.ask(Request::Pause);
-    bench.until("the pause", 12.0, |bench| bench.session.job_status() == JobStatus::Paused);
+    bench.until("the pause", 30.0, |bench| bench.session.job_status() == JobStatus::Paused);
     stall(&mut bench, 4.0);
     bench.run(1.0);
     assert_eq!(bench.session.job_status(), JobStatus::Paused);

@@ -37,6 +37,8 @@ pub(super) enum Wish {
     Start,
     /// The job is paused, and nobody is there: go on.
     Resume,
+    /// The board holds its motion, and nobody is there.
+    Held,
     /// It is over.
     End,
 }
@@ -51,6 +53,7 @@ pub(super) struct Observer {
     pub(super) moves: u64,
     pub(super) homing: Vec<Homing>,
     pub(super) pauses: u32,
+    pub(super) holds: u32,
     pub(super) nozzle: TemperatureWatch,
     pub(super) min_queued: Option<Seconds>,
     pub(super) print_time: Seconds,
@@ -59,6 +62,8 @@ pub(super) struct Observer {
     pub(super) error: Option<PrinterError>,
     /// Where the session's moves are not the file's.
     pub(super) mismatch: Option<String>,
+    /// Why the board last held its motion.
+    pub(super) held: Option<PrinterError>,
     /// The whole job was printed.
     pub(super) done: bool,
     /// A run that has begun and not yet had its first move.
@@ -81,12 +86,14 @@ impl Observer {
             moves: 0,
             homing: Vec::new(),
             pauses: 0,
+            holds: 0,
             nozzle: TemperatureWatch::default(),
             min_queued: None,
             print_time: Seconds::ZERO,
             line: 0,
             error: None,
             mismatch: None,
+            held: None,
             done: false,
             new_run: None,
             run_start: None,
@@ -130,6 +137,11 @@ impl Observer {
             Event::Paused => {
                 self.pauses += 1;
                 return Some(Wish::Resume);
+            }
+            Event::Held(error) => {
+                self.holds += 1;
+                self.held = Some(error);
+                return Some(Wish::Held);
             }
             Event::JobDone => {
                 self.done = true;

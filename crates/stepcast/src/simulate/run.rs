@@ -7,12 +7,12 @@ use std::{collections::BTreeMap, time::Instant};
 
 use printer::{
     config::PrinterConfig,
-    error::PrinterError,
+    error::{ErrorCode, PrinterError},
     machine::{EXTRUDER, MOTOR_NAMES},
     session::{JobOptions, JobStatus, Request, Session},
 };
 use units::{Hertz, Seconds, Ticks};
-use virtual_printer::{State, VirtualPrinter};
+use virtual_printer::{HostStall, State, VirtualPrinter};
 
 use super::{
     observer::{Observer, Wish},
@@ -85,6 +85,10 @@ pub(super) struct Simulation {
     job: Input,
     job_fed: bool,
     options: JobOptions,
+    /// The user confirms that a held print goes on.
+    confirm_holds: bool,
+    /// When the host does nothing: from and until when; soonest last.
+    stalls: Vec<(Ticks, Ticks)>,
     stage: Stage,
     next_sample: Ticks,
     seed: u64,
@@ -105,7 +109,8 @@ impl Simulation {
         let step_distances = printer::machine::step_distances(&config).map(|distance| distance.0);
         let tally = Tally::new(step_distances, board.clock);
         let host_hz = board.clock;
-        let printer = VirtualPrinter::new(board, &machine, &args.machine.faults(), args.machine.seed, tally)?;
+        let faults = args.machine.faults();
+        let printer = VirtualPrinter::new(board, &machine, &faults, args.machine.seed, tally)?;
         let clock = HostClock::new(printer.start(), host_hz);
         let [x, y, z, _] = step_distances;
         Ok(Self {
@@ -115,6 +120,8 @@ impl Simulation {
             job: Input::open(&args.file)?,
             job_fed: false,
             options,
+            confirm_holds: args.confirm_holds,
+            stalls: stalls(&faults.host_stalls, printer.start(), host_hz),
             stage: Stage::Connecting,
             next_sample: printer.start(),
             seed: args.machine.seed,
@@ -133,7 +140,10 @@ impl Simulation {
         let mut to_board = Vec::new();
         let mut rounds = 0u32;
         loop {
-            let wake = self.attend(&mut to_board)?;
+            let wake = match self.stalled_until() {
+                Some(until) => self.clock.at(until),
+                None => self.attend(&mut to_board)?,
+            };
             if let Stage::Watching(until) = self.stage
                 && self.printer.now() >= until
             {
@@ -145,7 +155,7 @@ impl Simulation {
             let until = self.clock.ticks_at(wake).max(earliest).min(self.next_sample.max(earliest));
             self.printer.run_until(until, &mut to_host);
             let now = self.printer.now();
-            if !to_host.is_empty() {
+            if !to_host.is_empty() && self.stalled_until().is_none() {
                 self.session.receive(&to_host, self.clock.at(now));
                 to_host.clear();
             }
@@ -190,7 +200,10 @@ impl Simulation {
                     self.stage = Stage::Printing;
                     self.session.start_job(self.options.clone(), now)
                 }
-                Wish::Resume => self.session.request(Request::Resume, now),
+                Wish::Held if !self.confirm_holds => {
+                    Err(self.observer.held.clone().unwrap_or(ErrorCode::HeldHostAway.into()))
+                }
+                Wish::Resume | Wish::Held => self.session.request(Request::Resume, now),
                 Wish::End => {
                     self.end();
                     Ok(())
@@ -234,9 +247,10 @@ impl Simulation {
         self.next_sample = now + self.ticks(SAMPLE_INTERVAL);
         let extruding = self.ticks(EXTRUDING);
         let state = self.printer.state();
+        let motion_now = self.printer.motion_now();
         let tally = self.printer.recorder_mut();
         // Up to now, no pulse is missing.
-        tally.path.settle(now);
+        tally.path.settle(motion_now);
         let extruding = tally.extruded_at.is_some_and(|at| at + extruding >= now);
         let time = self.clock.at(now);
         if self.stage == Stage::Printing
@@ -244,6 +258,13 @@ impl Simulation {
         {
             self.observer.nozzle.sample(time, nozzle.temperature, extruding);
         }
+    }
+
+    /// Until when the host does nothing, if it is held up now.
+    fn stalled_until(&mut self) -> Option<Ticks> {
+        let now = self.printer.now();
+        while self.stalls.pop_if(|(_, until)| *until <= now).is_some() {}
+        self.stalls.last().filter(|(from, _)| *from <= now).map(|(_, until)| *until)
     }
 
     fn check_stall(&self) -> anyhow::Result<()> {
@@ -278,11 +299,12 @@ impl Simulation {
         self.observer.finish();
         let state = self.printer.state();
         let profile_name = self.printer.profile().name;
+        let motion_now = self.printer.motion_now();
         let tally = self.printer.recorder_mut();
         if self.observer.done {
             tally.path.finish();
         } else {
-            tally.path.settle(now);
+            tally.path.settle(motion_now);
         }
         let still = tally.last_step.is_none_or(|at| at + Ticks(1) < now);
         self.after = After {
@@ -321,10 +343,22 @@ impl Simulation {
             step_digest: tally.digest.step_text(),
             homing: std::mem::take(&mut self.observer.homing),
             pauses: self.observer.pauses,
+            holds: self.observer.holds,
             after: self.after,
             motors,
         }
     }
+}
+
+/// From and until when the host is held up; soonest last.
+fn stalls(stalls: &[HostStall], start: Ticks, clock: Hertz) -> Vec<(Ticks, Ticks)> {
+    let span = |stall: &HostStall| {
+        let from = start + clock.ticks_in(stall.at);
+        (from, from + clock.ticks_in(stall.lasts))
+    };
+    let mut spans: Vec<_> = stalls.iter().map(span).collect();
+    spans.sort_by_key(|&(from, _)| core::cmp::Reverse(from));
+    spans
 }
 
 fn motors(observer: &Observer, tally: &Tally, state: &State) -> BTreeMap<&'static str, Motor> {
