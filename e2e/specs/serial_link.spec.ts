@@ -70,7 +70,7 @@ async function unplugWhilePrinting(
   bridge.unplug(port);
   await expect(panel.alert).toContainText('The printer was unplugged, or its board switched off.');
   await expect(panel.alert).toContainText('does not start again by itself');
-  await expect(panel.alert).toContainText(/heaters off within 3 seconds/);
+  await expect(panel.alert).toContainText(/heaters off within 5 seconds/);
   await expect(panel.status).toContainText('Not connected');
   await expect(panel.job).toContainText('The print stopped before its end.');
   // The board looks after itself.

@@ -66,7 +66,7 @@ const JOB_ENDED: &str = "The print has ended: the moves before that place were m
 const HELD: &str = "The head rests on its path, no step was lost and the position is known. Heaters stay as they \
                     were set, and the board goes on watching them. Nothing goes on by itself.";
 /// Contact is gone, so nothing can be claimed but what the board does by itself.
-const ON_ITS_OWN: &str = "The printer is on its own: its board switches the heaters off within 3 seconds without \
+const ON_ITS_OWN: &str = "The printer is on its own: its board switches the heaters off within 5 seconds without \
                           orders and stops when its queue of moves is empty. It may have lost its position.";
 
 catalogue! {

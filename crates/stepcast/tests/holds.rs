@@ -1,4 +1,4 @@
-//! Prints whose host is held up, on boards that can hold their motion and on others.
+//! Prints whose host is held up.
 
 use std::{
     fs,
@@ -10,9 +10,9 @@ use serde_json::Value;
 
 const MACHINE: &str = include_str!("../../../samples/printer.cfg");
 
-/// Heat, a long way and a long arc, with the fan on and off.
+/// Heat, a long way, and the fan on and off.
 const PRINT: &str = "M104 S200\nG28\nM109 S200\nG90\nM82\nG92 E0\nG1 Z0.3 F600\nG1 X20 Y20 F9000\n\
-    G1 X150 E5 F1800\nM106 S200\nG1 Y150 E10\nG1 X20 E15\nM107\nG3 X150 Y20 I65 J-65 E22\nG1 E21 F2400\n\
+    G1 X150 E5 F1800\nM106 S200\nG1 Y150 E10\nG1 X20 E15\nM107\nG1 X150 Y20 E22\nG1 E21 F2400\n\
     G1 X10 Y10 F12000\nM104 S0\nM84\n";
 
 fn scratch(name: &str, content: &str) -> PathBuf {
@@ -62,7 +62,7 @@ fn a_print_whose_host_is_held_up_is_the_same_print() {
 }
 
 #[test]
-fn nothing_goes_on_without_a_word_and_plain_boards_stop() {
+fn nothing_goes_on_without_a_word() {
     let clean = simulate("holds-clean-too", &[]);
     let fault = format!("--fault=host-stall=3@{}", on_the_way(&clean));
     let held = simulate("holds-unconfirmed", &[&fault]);

@@ -48,6 +48,8 @@ export type ErrorCode =
   | 'protocol-fault'
   | 'board-pin-refused'
   | 'board-shutdown'
+  | 'held-host-away'
+  | 'held-queue-dry'
   | 'busy-printing'
   | 'no-job'
   | 'not-connected'

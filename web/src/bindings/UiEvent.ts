@@ -64,7 +64,11 @@ text: string, } | { "type": "notice",
 /**
  * What and where.
  */
-finding: Finding, } | { "type": "paused" } | { "type": "resumed" } | { "type": "job-done" } | { "type": "job-cancelled" } | { "type": "error", 
+finding: Finding, } | { "type": "paused" } | { "type": "held", 
+/**
+ * Why.
+ */
+error: PrinterError, } | { "type": "resumed" } | { "type": "job-done" } | { "type": "job-cancelled" } | { "type": "error", 
 /**
  * What.
  */

@@ -103,6 +103,8 @@ function fromEvent(event: UiEvent): MachineEvent | null {
       return { kind: 'done' };
     case 'job-cancelled':
       return { kind: 'cancelled' };
+    case 'held':
+      return { kind: 'held', trouble: inWords(event.error) };
     case 'error':
       return { kind: 'trouble', trouble: inWords(event.error) };
     case 'dropped':

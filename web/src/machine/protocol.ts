@@ -35,7 +35,7 @@ export type Phase =
   | 'shutdown'
   | 'failed';
 
-export type JobStatus = 'none' | 'printing' | 'pausing' | 'paused' | 'ending';
+export type JobStatus = 'none' | 'printing' | 'pausing' | 'paused' | 'ending' | 'held';
 
 export interface LinkCounts {
   readonly bytesSent: number;
@@ -84,7 +84,7 @@ export type MachineEvent =
   | { readonly kind: 'notice'; readonly line: number; readonly severity: string; readonly text: string }
   | { readonly kind: 'homed'; readonly axis: Axis; readonly position: Mm }
   | { readonly kind: 'paused' | 'resumed' | 'done' | 'cancelled' }
-  | { readonly kind: 'trouble'; readonly trouble: Trouble }
+  | { readonly kind: 'held' | 'trouble'; readonly trouble: Trouble }
   | { readonly kind: 'dropped'; readonly count: number };
 
 export type Wish =

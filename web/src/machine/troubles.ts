@@ -6,7 +6,7 @@ import type { Trouble } from './protocol';
 
 const NOTHING_MOVED = 'Nothing was sent to the printer: it did not move and no heater was switched on.';
 const ON_ITS_OWN =
-  'The printer is on its own: its board switches the heaters off within 3 seconds without orders and stops when its queue of moves is empty. It may have lost its position.';
+  'The printer is on its own: its board switches the heaters off within 5 seconds without orders and stops when its queue of moves is empty. It may have lost its position.';
 
 const trouble = (code: string, happened: string, safe: string, todo: string): Trouble => ({
   code,

@@ -132,6 +132,8 @@ const HEATERS = { extruder: 'nozzle', heater_bed: 'bed' } as const;
 function waiting(): string | null {
   if (job.value === 'paused')
     return 'Paused. The heaters stay on; the head can be moved by hand and goes back.';
+  if (job.value === 'held')
+    return 'Held: the head rests on its path, with no step lost. Look at the print, then resume or cancel it.';
   const heater = heatingUp.value;
   if (heater) {
     const [now, target] = [heater.temperature, heater.target].map((value) => formatNumber(value));
@@ -163,7 +165,7 @@ function Actions(): JSX.Element {
   const isBusy = state === 'pausing' || state === 'ending';
   return (
     <>
-      {state === 'paused' ? (
+      {state === 'paused' || state === 'held' ? (
         <Button kind="primary" icon="play" class="big" onClick={() => void wish({ kind: 'resume' })}>
           Resume
         </Button>

@@ -20,6 +20,7 @@ const JOBS = {
   pausing: 'Pausing',
   paused: 'Paused',
   ending: 'Ending the print',
+  held: 'Held',
 } as const;
 
 const status = computed<Status>(() => {

@@ -156,6 +156,7 @@ function happened(event: MachineEvent): void {
       outcome.value = 'cancelled';
       note('info', 'The print was cancelled.');
       break;
+    case 'held':
     case 'trouble':
       report(event.trouble);
       break;
