@@ -8,7 +8,7 @@ if (!executablePath) throw new Error(`Missing: ${BROWSER_ADVICE}`);
 export default defineConfig({
   testDir: './specs',
   outputDir: './test-results',
-  // Two cores and software GL: a second browser would only make both late.
+  // Prints and pictures are timed: a second browser beside the first would make both late on a small computer.
   workers: 1,
   fullyParallel: false,
   forbidOnly: Boolean(process.env['CI']),

@@ -10,7 +10,7 @@
 // Plain Node, built-ins only: it has to run before anything is installed.
 import { existsSync } from 'node:fs';
 import { join } from 'node:path';
-import { parseArgs } from 'node:util';
+import * as util from 'node:util';
 
 import { inBackground } from './lib/background.mjs';
 import { fileServer, listen } from './lib/server.mjs';
@@ -21,7 +21,9 @@ const PORT_DEFAULT = 8372;
 const PAGE = join(root, 'web', 'dist');
 
 function readArguments() {
-  const { values } = parseArgs({
+  // An older Node has no parseArgs: it gets the advice of the set-up, not an error of the language.
+  if (!util.parseArgs) return { port: PORT_DEFAULT, build: true };
+  const { values } = util.parseArgs({
     options: { port: { type: 'string' }, 'no-build': { type: 'boolean', default: false } },
   });
   const port = Number(values.port ?? PORT_DEFAULT);

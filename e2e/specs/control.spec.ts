@@ -72,6 +72,57 @@ test('temperatures: targets with a decimal comma, presets, what is no number or 
   await expect(panel.target('Bed')).toHaveValue('0');
 });
 
+test('what is typed heats nothing until it is set', async ({ panel }) => {
+  await panel.connectVirtual(BY_HAND);
+  const nozzle = panel.target('Nozzle');
+  const set = panel.temperatures.getByRole('button', { name: 'Set Nozzle target' });
+  await expect(set).toHaveCount(0);
+  await nozzle.fill('210');
+  await expect(set).toBeEnabled();
+  // As when another window is chosen.
+  await nozzle.blur();
+  await expect(nozzle).toHaveValue('0');
+  await expect(set).toHaveCount(0);
+  await nozzle.fill('900');
+  await expect(set).toBeDisabled();
+  // By mouse or finger, and by keyboard.
+  await nozzle.fill('65');
+  await set.click();
+  await expect(nozzle).toHaveValue('65');
+  await expect(panel.heater('Nozzle')).toContainText('Heating');
+  await nozzle.fill('70');
+  await nozzle.press('Tab');
+  await expect(set).toBeFocused();
+  await set.press('Enter');
+  await expect(nozzle).toHaveValue('70');
+  const heaters = (await panel.record()).heaters;
+  expect(heaters.find(({ name }) => name === 'extruder')?.temperature_c).toBeLessThan(200);
+
+  const bed = panel.target('Bed');
+  await bed.fill('90');
+  await panel.disconnect();
+  await panel.connectVirtual(BY_HAND);
+  await expect(bed).toHaveValue('0');
+});
+
+test('what is typed when the board stops is put away', async ({ panel }) => {
+  await panel.connectVirtual(BY_HAND);
+  const nozzle = panel.target('Nozzle');
+  await nozzle.fill('210');
+  await panel.page.evaluate(() =>
+    document.querySelector<HTMLElement>('button[aria-label="Emergency stop"]')?.click(),
+  );
+  await expect(nozzle).toBeDisabled();
+  await expect(nozzle).toHaveValue('0');
+  // Nothing was asked of the board that has stopped.
+  await expect(panel.alert).toContainText('The emergency stop was asked for.');
+  await panel.alert.getByRole('button', { name: 'Restart the board' }).click();
+  await expect(nozzle).toBeEnabled();
+  await expect(nozzle).toHaveValue('0');
+  await panel.page.keyboard.press('Enter');
+  await expect(panel.heater('Nozzle')).toContainText('Off');
+});
+
 test('filament: refused while cold, pushed once hot', async ({ panel }) => {
   await panel.connectVirtual(BY_HAND);
   const extrude = panel.motion.getByRole('button', { name: 'Extrude' });
@@ -111,6 +162,15 @@ test('speed and fan while printing', async ({ panel, makeFile }) => {
   await expect(panel.status).toContainText('Printing');
   // Moving by hand is the print's business now.
   await expect(panel.motion.getByRole('button', { name: /^Left/ })).toBeDisabled();
+});
+
+test('the virtual printer is made faster while it prints', async ({ panel, makeFile }) => {
+  await panel.connectVirtual('Real time');
+  // Eight minutes: in real time it would still be printing when this test is over.
+  await panel.drop(makeFile('travels.gcode', travels(300).gcode));
+  await panel.startPrint();
+  await panel.tuning.getByText('up to 200×').click();
+  await expect(panel.job).toContainText('The print is done', { timeout: 50_000 });
 });
 
 test('the console: sends, answers, says what it does not know, remembers', async ({ panel }) => {

@@ -43,7 +43,7 @@ test('an unknown macro has to be confirmed by its line, and is then left out', a
 }) => {
   await panel.connectVirtual();
   await panel.drop(makeFile('macro.gcode', `START_PRINT BED=60\n${PREAMBLE}${SQUARE}`));
-  await expect(panel.job).toContainText('A line has to be confirmed first');
+  await expect(panel.job).toContainText('A command has to be confirmed first');
   await expect(panel.print).toBeDisabled();
   const line = panel.job.getByRole('checkbox', { name: /Line 1\b.*START_PRINT/ });
   await line.check();
@@ -55,6 +55,23 @@ test('an unknown macro has to be confirmed by its line, and is then left out', a
   await expect(panel.job).toContainText('The print is done.', { timeout: 45_000 });
   const [x] = (await panel.record()).motors;
   expect(x?.position_mm).toBeCloseTo(50, 1);
+});
+
+test('many unknown macros are confirmed a command at a time', async ({ panel, makeFile }) => {
+  await panel.connectVirtual();
+  // More than are listed, and one that only comes after those.
+  const macros = Array.from({ length: 1200 }, (_, at) => (at % 2 ? 'AFTER_LAYER' : 'BEFORE_LAYER'));
+  const gcode = [PREAMBLE + SQUARE.replace('M104 S0\n', ''), ...macros, 'LATE_MACRO', 'M104 S0', ''].join(
+    '\n',
+  );
+  await panel.drop(makeFile('macros.gcode', gcode));
+  await expect(panel.job).toContainText('3 commands have to be confirmed first');
+  for (const name of [/Lines .* and 495 more.*BEFORE_LAYER/, /Lines .* more.*AFTER_LAYER/, /More lines/]) {
+    await expect(panel.print).toBeDisabled();
+    await panel.job.getByRole('checkbox', { name }).check();
+  }
+  await panel.print.click();
+  await expect(panel.job).toContainText('The print is done.', { timeout: 45_000 });
 });
 
 test('a binary file is no G-code', async ({ panel, makeFile }) => {

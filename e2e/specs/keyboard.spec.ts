@@ -55,10 +55,15 @@ test('connects, opens a file, prints, pauses, resumes and sees the end', async (
   await page.keyboard.press('Enter');
   await expect(panel.status).toContainText('Printing');
 
-  await tabTo(page, panel.job.getByRole('button', { name: 'Pause' }));
+  const pause = panel.job.getByRole('button', { name: 'Pause' });
+  await tabTo(page, pause);
+  // Not before the press on Print, in the same place, is over.
+  await expect(pause).toBeEnabled();
   await page.keyboard.press('Space');
   await expect(panel.status).toContainText('Paused', { timeout: 30_000 });
-  await tabTo(page, panel.job.getByRole('button', { name: 'Resume' }));
+  const resume = panel.job.getByRole('button', { name: 'Resume' });
+  await tabTo(page, resume);
+  await expect(resume).toBeEnabled();
   await page.keyboard.press('Space');
   await expect(panel.job).toContainText('The print is done.', { timeout: 60_000 });
 });
@@ -81,4 +86,53 @@ test('the 3D view is turned by keyboard and is not a trap', async ({ page, panel
     await page.keyboard.press(key);
   await page.keyboard.press('Tab');
   await expect(view).not.toBeFocused();
+});
+
+test('a dialog that is closed does not close the next one with it', async ({ page, panel }) => {
+  await panel.openDialog('Machine');
+  // Both in one task: faster than any hand, as a slow computer is.
+  await page.evaluate(() => {
+    const press = (name: string): void =>
+      document.querySelector<HTMLElement>(`button[aria-label="${name}"]`)?.click();
+    press('Close');
+    press('Settings');
+  });
+  await expect(panel.dialog('Machine')).toHaveCount(0);
+  // The browser tells of a dialog's end in a later task: after two pictures it has.
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  await expect(panel.dialog('Settings')).toBeVisible();
+});
+
+test('a dialog that is opened twice by Enter stops nothing', async ({ page, panel, makeFile }) => {
+  await panel.connectVirtual('up to 20×');
+  await panel.drop(makeFile('travels.gcode', travels(3000).gcode));
+  await panel.startPrint();
+  await expect(panel.fact(panel.job, 'Line')).toHaveText(/[1-9]\d/);
+
+  const cancel = panel.job.getByRole('button', { name: 'Cancel' });
+  await cancel.focus();
+  await page.keyboard.press('Enter');
+  const question = page.getByRole('dialog', { name: 'End the print?' });
+  await expect(question.getByRole('button', { name: 'Go on printing' })).toBeFocused();
+  await page.keyboard.press('Enter');
+  await expect(question).toHaveCount(0);
+  await expect(cancel).toBeFocused();
+
+  for (const name of ['Settings', 'Machine'] as const) {
+    await panel.top.getByRole('button', { name, exact: true }).focus();
+    await page.keyboard.press('Enter');
+    const dialog = panel.dialog(name);
+    await expect(dialog.getByRole('heading', { name, exact: true })).toBeFocused();
+    await page.keyboard.press('Enter');
+    await page.keyboard.press('Space');
+    await expect(dialog).toBeVisible();
+    await page.keyboard.press('Escape');
+    await expect(dialog).toHaveCount(0);
+  }
+  const line = async (): Promise<number> =>
+    Number((await panel.fact(panel.job, 'Line').innerText()).replace(',', ''));
+  const before = await line();
+  await expect.poll(line).toBeGreaterThan(before);
+  await expect(panel.status).toContainText('Printing');
+  await expect(panel.messages).not.toContainText('Emergency stop pressed');
 });

@@ -1,10 +1,11 @@
 // A whole print on the virtual printer: a slicer's file dropped on the page, printed to its end, and what the device did
 // compared with what the native planner makes of the same file.
 import { readFileSync } from 'node:fs';
-import { lastPlace, nativePlan } from '../fixtures/plan.ts';
+import { nativePlan } from '../fixtures/plan.ts';
 import { expect, test } from '../fixtures/test.ts';
 import { sample } from '../pages/panel.ts';
 import { motor, pulsesOf, type VirtualState } from '../pages/record.ts';
+import { endOf } from '../serial/gcode.ts';
 
 const FILE = 'test-part-small.gcode';
 /** A step of X and Y is 0.0125 mm; a place is a whole number of steps away from the one in the file. */
@@ -43,7 +44,7 @@ test('a dropped file is printed to its end, step for step', async ({ panel }) =>
   const expected = motors.map((name) => [name, (plan.motors[name]?.steps ?? 0) + (homing[name] ?? 0)]);
   expect(pulsesOf(record)).toEqual(Object.fromEntries(expected));
 
-  const ends = lastPlace(gcode.toString());
+  const ends = endOf(gcode.toString());
   for (const [index, axis] of AXES.entries()) {
     const error = place(record, axis) - (ends[index] ?? Number.NaN) - (beside[index] ?? Number.NaN);
     expect(Math.abs(error), `the end of ${axis}`).toBeLessThan(PLACE_ERROR_MM);

@@ -49,9 +49,27 @@ test('the page asks before it is left while printing; then nothing goes on by it
   expect(() => recordOf(report)).toThrow('no virtual printer is connected');
 });
 
-test('without a print the page is left without a question', async ({ page, panel }) => {
+test('without a print the page is left without a question, with one it is not', async ({
+  page,
+  panel,
+  makeFile,
+}) => {
+  // Without a listener they would be accepted unseen.
+  const questions: string[] = [];
+  page.on('dialog', (dialog) => {
+    questions.push(dialog.type());
+    void dialog.accept();
+  });
   await panel.connectVirtual();
-  // Playwright would fail on a question that nobody answers.
   await page.reload();
   await expect(panel.status).toContainText('Not connected');
+  expect(questions).toEqual([]);
+
+  // The browser asks only on a page that somebody has used.
+  await panel.connectVirtual();
+  await panel.drop(makeFile('travels.gcode', travels(3000).gcode));
+  await panel.startPrint();
+  await page.reload();
+  await expect(panel.status).toContainText('Not connected');
+  expect(questions).toEqual(['beforeunload']);
 });

@@ -59,6 +59,38 @@ test('a port that another program holds', async ({ bridge, open }) => {
   await expect(panel.status).toContainText('Ready');
 });
 
+test('of two boards alike, the one that is chosen is opened, whichever is unplugged before', async ({
+  bridge,
+  open,
+}) => {
+  const [first, second] = [bridge.add(new PrinterDevice(), FAST), bridge.add(new PrinterDevice(), FAST)];
+  const panel = await open();
+  const dialog = await panel.chooseSerial();
+  for (const port of [second, first]) {
+    bridge.nextAnswer(port);
+    await dialog.getByRole('button', { name: /^Choose (a|another) port$/ }).click();
+  }
+  const choices = dialog.getByRole('radio', { name: /1d50:614e/ });
+  await expect(choices).toHaveCount(2);
+  await expect(choices.first()).toBeChecked();
+  // What was chosen goes away: the other one is not taken unasked.
+  bridge.unplug(first);
+  await expect(choices).toHaveCount(1);
+  await expect(choices).not.toBeChecked();
+  await expect(dialog.getByRole('status')).toContainText('no longer there');
+  await expect(dialog.getByRole('button', { name: 'Connect', exact: true })).toBeDisabled();
+  // What is chosen stays so when its place in the list changes.
+  bridge.replug(first);
+  await expect(choices).toHaveCount(2);
+  await choices.nth(1).check();
+  bridge.unplug(first);
+  await expect(choices).toHaveCount(1);
+  await expect(choices).toBeChecked();
+  await panel.connectIn(dialog);
+  await expect(panel.status).toContainText('Ready');
+  expect([first.counts.openings, second.counts.openings]).toEqual([0, 1]);
+});
+
 async function unplugWhilePrinting(
   panel: SerialPanel,
   bridge: DeviceBridge,

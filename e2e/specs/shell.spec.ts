@@ -47,6 +47,13 @@ test('a planner that cannot be loaded is said, with what to do', async ({ page, 
   await expect(connect).toContainText('The planner could not be loaded.');
 });
 
+test('a sample that cannot be loaded is said', async ({ panel, page, watch }) => {
+  watch.expectError(/404/);
+  await page.route('**/test-part-*.gcode', (route) => route.fulfill({ status: 404, body: '' }));
+  await panel.preview.getByRole('button', { name: 'Open the sample' }).click();
+  await expect(panel.alert).toContainText('The sample could not be loaded.');
+});
+
 /** As Firefox and Safari are. */
 const withoutSerial = (page: Page): Promise<unknown> =>
   page.addInitScript(() => {

@@ -59,9 +59,37 @@ test('emergency stop by keyboard alone', async ({ panel, makeFile }) => {
 test('emergency stop from inside a dialog', async ({ panel, makeFile }) => {
   await printing(panel, makeFile, LONG);
   const dialog = await panel.openDialog('Settings');
+  await expect(dialog.getByRole('alert')).toBeEmpty();
   await dialog.getByRole('button', { name: 'Emergency stop' }).click();
+  // What lies behind the dialog cannot be reached.
+  await expect(dialog.getByRole('alert')).toContainText('The emergency stop was asked for.');
+  await expect(dialog.getByRole('button', { name: 'Restart the board' })).toBeVisible();
   await panel.closeDialog(dialog);
   await expectStopped(panel);
+  // The message may be put away; the way on stays.
+  await panel.alert.getByRole('button', { name: 'Put this message away' }).click();
+  await expect(panel.alert).not.toContainText('The emergency stop was asked for.');
+  await expect(panel.alert).toContainText('The board has stopped.');
+  await panel.alert.getByRole('button', { name: 'Restart the board' }).click();
+  await expect(panel.status).toContainText('Ready');
+  await expect(panel.alert).toBeEmpty();
+});
+
+test('a double click on Print starts the print and does not pause it', async ({ panel, makeFile }) => {
+  await panel.connectVirtual('up to 20×');
+  await panel.drop(makeFile('travels.gcode', LONG.gcode));
+  await expect(panel.print).toBeEnabled();
+  await panel.print.dblclick({ delay: 60 });
+  await expect(panel.status).toContainText('Printing');
+  const pause = panel.job.getByRole('button', { name: 'Pause' });
+  // Just after the change, too.
+  await pause.dispatchEvent('click');
+  await expect(pause).toBeEnabled();
+  await expect(panel.fact(panel.job, 'Line')).toHaveText(/[1-9]\d/);
+  await expect(panel.status).toContainText('Printing');
+  await expect(panel.messages).not.toContainText('Paused.');
+  await pause.click();
+  await expect(panel.status).toContainText('Paused', { timeout: 30_000 });
 });
 
 test('pause, move by hand, resume: the print ends where it should', async ({ panel, makeFile }) => {

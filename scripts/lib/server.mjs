@@ -67,6 +67,14 @@ export function fileServer(folder) {
   });
 }
 
+/** Up to here ports belong to the system: without its leave none of them may be taken. */
+const PORT_SYSTEM_MAX = 1023;
+
+/** Whether another port may be free where this one is not. On Windows, ports that it keeps for itself are "forbidden". */
+export function mayTryNext(code, port) {
+  return code === 'EADDRINUSE' || (code === 'EACCES' && port > PORT_SYSTEM_MAX);
+}
+
 /** Listens on `host`; where a port is taken, on the next free one. Port 0 is any. Returns the address. */
 export async function listen(server, { port = 0, host = '127.0.0.1' } = {}) {
   for (let offset = 0; ; offset += 1) {
@@ -78,6 +86,6 @@ export async function listen(server, { port = 0, host = '127.0.0.1' } = {}) {
       });
     });
     if (!failure) return `http://${host}:${server.address().port}/`;
-    if (failure.code !== 'EADDRINUSE' || offset + 1 >= PORTS_TRIED_MAX) throw failure;
+    if (!mayTryNext(failure.code, port + offset) || offset + 1 >= PORTS_TRIED_MAX) throw failure;
   }
 }

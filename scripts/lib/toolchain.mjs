@@ -5,7 +5,8 @@
 import { spawnSync } from 'node:child_process';
 import { existsSync, readFileSync } from 'node:fs';
 
-export const NODE_MIN = [20, 19];
+/** What the page's build (Vite) runs on: the first version of each line; every later line will do. */
+export const NODE_MIN = [[20, 19], [22, 12]];
 
 /** True when a program is there and answers. */
 export function has(program, args = ['--version']) {
@@ -16,6 +17,12 @@ export function has(program, args = ['--version']) {
 export function atLeast(version, minimum) {
   const [major, minor] = version.replace(/^v/, '').split('.').map(Number);
   return major > minimum[0] || (major === minimum[0] && minor >= minimum[1]);
+}
+
+/** Whether the page can be built with this Node: 20.19 or a later 20, or 22.12 and everything after it. */
+export function isNodeGood(version) {
+  const [old, current] = NODE_MIN;
+  return atLeast(version, current) || (atLeast(version, old) && !atLeast(version, [old[0] + 1, 0]));
 }
 
 /** The [toolchain] table of rust-toolchain.toml: strings and lists of strings, which is all that it may hold. */
@@ -98,8 +105,9 @@ function hasLinker() {
 /** One line for each thing that is missing, with the command that installs it. */
 export function missing() {
   const lines = [];
-  if (!atLeast(process.versions.node, NODE_MIN)) {
-    lines.push(`Node ${NODE_MIN.join('.')} or newer (this is ${process.versions.node}): ${advice('node')}`);
+  if (!isNodeGood(process.versions.node)) {
+    const [old, current] = NODE_MIN.map((version) => version.join('.'));
+    lines.push(`Node ${old} or a later 20, or ${current} or newer (this is ${process.versions.node}): ${advice('node')}`);
   }
   if (!has('rustup')) lines.push(`rustup, which brings Rust: ${advice('rustup')}`);
   if (!hasLinker()) lines.push(`a C compiler (cc), which Rust links with: ${advice('linker')}`);

@@ -6,7 +6,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 
-import { fileFor, fileServer, listen } from '../lib/server.mjs';
+import { fileFor, fileServer, listen, mayTryNext } from '../lib/server.mjs';
 
 const base = mkdtempSync(join(tmpdir(), 'stepcast-server-'));
 const folder = join(base, 'page');
@@ -78,4 +78,11 @@ test('where the port is taken, the next one is used', async () => {
   const other = await listen(second, { port: Number(port) });
   second.close();
   assert.notEqual(new URL(other).port, port);
+});
+
+test('a port that the system keeps for itself is passed over, but not one that takes a privilege', () => {
+  assert.ok(mayTryNext('EADDRINUSE', 80));
+  assert.ok(mayTryNext('EACCES', 8372));
+  assert.ok(!mayTryNext('EACCES', 80));
+  assert.ok(!mayTryNext('EADDRNOTAVAIL', 8372));
 });

@@ -2,13 +2,20 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 
-import { advice, atLeast, installArguments, isInstalled, readToolchain } from '../lib/toolchain.mjs';
+import { advice, atLeast, installArguments, isInstalled, isNodeGood, readToolchain } from '../lib/toolchain.mjs';
 
 test('versions compare by number, not by letter', () => {
   assert.ok(atLeast('20.19.0', [20, 19]));
   assert.ok(atLeast('v22.1.0', [20, 19]));
   assert.ok(!atLeast('20.9.0', [20, 19]));
   assert.ok(!atLeast('18.20.4', [20, 19]));
+});
+
+test('Node is judged as the page\'s build judges it', () => {
+  for (const good of ['20.19.0', '20.20.1', '22.12.0', '22.20.0', '23.0.0', '24.1.0']) assert.ok(isNodeGood(good), good);
+  for (const bad of ['18.20.4', '20.18.3', '21.7.3', '22.0.0', '22.11.0']) assert.ok(!isNodeGood(bad), bad);
+  const { engines } = JSON.parse(readFileSync(new URL('../../package.json', import.meta.url), 'utf8'));
+  assert.equal(engines.node, '^20.19.0 || >=22.12.0');
 });
 
 test('the toolchain is read from the file that rustup reads', () => {

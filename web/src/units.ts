@@ -7,7 +7,6 @@ type Quantity<Name extends string> = number & { readonly [unit]: Name };
 export type Seconds = Quantity<'s'>;
 export type Milliseconds = Quantity<'ms'>;
 export type Mm = Quantity<'mm'>;
-export type MmPerMin = Quantity<'mm/min'>;
 export type Celsius = Quantity<'°C'>;
 /** 0 … 1. */
 export type Share = Quantity<'share'>;
@@ -15,6 +14,5 @@ export type Share = Quantity<'share'>;
 export const seconds = (value: number): Seconds => value as Seconds;
 export const milliseconds = (value: number): Milliseconds => value as Milliseconds;
 export const mm = (value: number): Mm => value as Mm;
-export const mmPerMin = (value: number): MmPerMin => value as MmPerMin;
 export const celsius = (value: number): Celsius => value as Celsius;
 export const share = (value: number): Share => value as Share;

@@ -1,7 +1,7 @@
 // A session that does what a test tells it, for the loops around it.
 
 import type { VirtualState } from '../src/bindings/VirtualState';
-import type { Trouble, Wish } from '../src/machine/protocol';
+import type { JobStatus, MachineEvent, Phase, Trouble, Wish } from '../src/machine/protocol';
 import type { Session, SessionSnapshot, SimulatedPrinter } from '../src/machine/session';
 import { celsius, type Seconds, seconds, share } from '../src/units';
 
@@ -32,19 +32,30 @@ export class FakeSession implements Session {
   period = 0.01;
   toSend: number[] = [];
   refusal: Trouble | null = null;
+  events: MachineEvent[] = [];
+  phase: Phase = 'ready';
+  job: JobStatus = 'none';
+  /** What everything throws from now on, as a planner that has panicked. */
+  panic: Error | undefined;
+  freed = false;
 
+  #live(): void {
+    if (this.panic) throw this.panic;
+  }
   receive(bytes: Uint8Array): void {
+    this.#live();
     this.received.push(...bytes);
   }
   poll(now: Seconds): Uint8Array<ArrayBuffer> {
+    this.#live();
     this.polls.push(now);
     return Uint8Array.from(this.toSend.splice(0));
   }
   wake(): Seconds {
     return seconds((this.polls.at(-1) ?? 0) + this.period);
   }
-  takeEvents(): [] {
-    return [];
+  takeEvents(): MachineEvent[] {
+    return this.events.splice(0);
   }
   wish(wish: Wish): Trouble | null {
     this.wishes.push(wish);
@@ -67,7 +78,8 @@ export class FakeSession implements Session {
     this.ended = true;
   }
   snapshot(): SessionSnapshot {
-    return SNAPSHOT;
+    this.#live();
+    return { ...SNAPSHOT, phase: this.phase, job: this.job };
   }
   /** A line through the stretch that was asked for: its speed is the time. */
   plannedSpeed(now: Seconds, behind: Seconds, ahead: Seconds): Float64Array<ArrayBuffer> {
@@ -75,6 +87,8 @@ export class FakeSession implements Session {
   }
   free(): void {
     this.polls.length = 0;
+    this.freed = true;
+    this.#live();
   }
 }
 

@@ -75,7 +75,8 @@ test('a file that cannot be read is not begun', async () => {
   expect(trouble?.code).toBe('file-unreadable');
 });
 
-test('a file that breaks off while it is printed pauses the print and says so', async () => {
+/** A print whose file breaks off while it is printed, and that waits for it. */
+async function brokenOff(): Promise<{ session: FakeSession; machine: Machine; told: FromMachine[] }> {
   const session = new FakeSession();
   const told: FromMachine[] = [];
   const machine = new Machine(
@@ -93,15 +94,43 @@ test('a file that breaks off while it is printed pauses the print and says so', 
       },
     });
   expect(await machine.print(file, [], () => seconds(0))).toBeNull();
+  session.job = 'printing';
   isThere = false;
   for (let round = 0; round < 50 && session.wishes.length === 0; round += 1) {
-    session.wants = 500_000;
+    // More than was read ahead, so that the session waits for what does not come.
+    session.wants = 5_000_000;
     machine.poll(seconds(round));
     await machine.catchUp();
     await new Promise((resolve) => setTimeout(resolve, 1));
   }
+  session.job = 'paused';
+  return { session, machine, told };
+}
+
+test('a file that breaks off while it is printed pauses the print and says so', async () => {
+  const { session, machine, told } = await brokenOff();
   machine.tell(seconds(99));
   expect(session.wishes).toEqual([{ kind: 'pause' }]);
   const events = told.flatMap((message) => (message.kind === 'events' ? message.events : []));
   expect(events).toMatchObject([{ kind: 'trouble', trouble: { code: 'file-unreadable' } }]);
+  // Its end would have made a whole line of the half that came last.
+  expect(session.ended).toBe(false);
+});
+
+test('a print whose file broke off can be cancelled, not resumed', async () => {
+  const { session, machine } = await brokenOff();
+  const refusal = machine.wish({ kind: 'resume' }, seconds(100));
+  expect(refusal?.code).toBe('file-unreadable');
+  expect(refusal?.todo).toContain('Cancel the print');
+  machine.tell(seconds(101));
+  expect(machine.wish({ kind: 'resume' }, seconds(102))?.code).toBe('file-unreadable');
+  expect(machine.wish({ kind: 'cancel' }, seconds(103))).toBeNull();
+  expect(session.wishes).toEqual([{ kind: 'pause' }, { kind: 'cancel' }]);
+  session.job = 'none';
+  session.events.push({ kind: 'cancelled' });
+  machine.poll(seconds(104));
+  // The next print has nothing to do with it.
+  session.job = 'printing';
+  expect(await machine.print(new Blob([content]), [], () => seconds(105))).toBeNull();
+  expect(machine.wish({ kind: 'resume' }, seconds(106))).toBeNull();
 });

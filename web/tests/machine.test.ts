@@ -1,7 +1,8 @@
 // What a connection tells the page, and when.
-import { expect, test } from 'vitest';
+import { expect, test, vi } from 'vitest';
 import { Machine } from '../src/machine/machine';
 import type { FromMachine } from '../src/machine/protocol';
+import { fileUnreadable } from '../src/machine/troubles';
 import { seconds } from '../src/units';
 import { FakeSession } from './fake_session';
 
@@ -28,6 +29,58 @@ test('the planned speed is told with each snapshot while somebody watches it', (
   expect(from).toBeLessThan(-5);
   expect(until).toBeGreaterThan(4);
   expect([...speed.pairs]).toEqual([from, 100 + (from ?? 0), until, 100 + (until ?? 0)]);
+});
+
+test('an emergency stop before the board is known is reported, and sent once it can be', () => {
+  const { machine: made, session } = machine();
+  session.phase = 'identifying';
+  session.refusal = fileUnreadable('not connected');
+  const refusal = made.wish({ kind: 'emergency-stop' }, seconds(1));
+  expect(refusal?.code).toBe('stop-not-sent');
+  expect(refusal?.todo).toContain('cut its power');
+  made.poll(seconds(2));
+  session.phase = 'synchronising';
+  session.refusal = null;
+  made.poll(seconds(3));
+  expect(session.wishes).toHaveLength(3);
+  // Once is enough.
+  made.poll(seconds(4));
+  expect(session.wishes).toHaveLength(3);
+  expect(made.wish({ kind: 'emergency-stop' }, seconds(5))).toBeNull();
+});
+
+test('after the connection has failed no emergency stop is promised', () => {
+  const { machine: made, session } = machine();
+  session.phase = 'failed';
+  session.refusal = fileUnreadable('not connected');
+  expect(made.wish({ kind: 'emergency-stop' }, seconds(1))?.happened).toContain(
+    'connection to the board has failed',
+  );
+  made.poll(seconds(2));
+  expect(session.wishes).toHaveLength(1);
+});
+
+test('the file of a job that ended in an error is let go of', async () => {
+  const { machine: made, session } = machine();
+  session.job = 'printing';
+  expect(await made.print(new Blob(['G28\n']), [], () => seconds(0))).toBeNull();
+  made.tell(seconds(1));
+  session.wants = 1;
+  made.poll(seconds(1));
+  expect(session.fed.length).toBe(1);
+  session.job = 'none';
+  made.tell(seconds(2));
+  session.wants = 1;
+  made.poll(seconds(3));
+  expect(session.fed.length).toBe(1);
+});
+
+test('what the session threw when a print was to begin is not taken for the file\u2019s fault', async () => {
+  const { machine: made, session } = machine();
+  vi.spyOn(session, 'startJob').mockImplementation(() => {
+    throw new Error('unreachable');
+  });
+  await expect(made.print(new Blob(['G28\n']), [], () => seconds(0))).rejects.toThrow('unreachable');
 });
 
 test('wake-ups that come late are counted, and told from a second on', () => {

@@ -1,6 +1,6 @@
 // Numbers are read however people write them.
 import { expect, test } from 'vitest';
-import { formatDuration, formatNumber, parseNumber } from '../src/panel/numbers';
+import { formatDuration, formatNumber, formatPlain, parseNumber } from '../src/panel/numbers';
 
 test.each([
   ['1.5', 1.5],
@@ -24,6 +24,16 @@ test.each(['', ' ', 'abc', '1e5', '--1', '1.2.3,4,5', 'NaN', 'Infinity', '0x10',
     expect(parseNumber(text)).toBeUndefined();
   },
 );
+
+test.each([
+  [250_000, 0],
+  [4_000_000, 0],
+  [1234.5, 1],
+  [0.1, 1],
+  [-12_345, 0],
+])('what a field shows of %d can be read back', (value, decimals) => {
+  expect(parseNumber(formatPlain(value, decimals))).toBe(value);
+});
 
 test('durations are short where they are short', () => {
   expect(formatDuration(0)).toBe('0:00');

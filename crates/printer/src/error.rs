@@ -187,7 +187,7 @@ catalogue! {
         "The board ran out of room for moves", ALL_STOPPED,
         "This is a fault of this program or of the firmware: please report it with the session's log.";
     EmergencyStop, "emergency-stop":
-        "The emergency stop was asked for", ALL_STOPPED,
+        "The emergency stop was asked for", STOPPED_BY_HOST,
         "When the reason is dealt with, restart the board and home.";
     BoardTooSlow, "board-too-slow":
         "The board could not keep up with its moves", ALL_STOPPED,

@@ -1,30 +1,17 @@
 #!/usr/bin/env node
 // Opens the built harness in a real Chromium, takes pictures and measures: `npm run harness [-- OUTPUT_FOLDER]`.
-// The browser: CHROME_PATH, else /usr/bin/chromium. Software GL, so that every machine gives the same pictures.
+// The browser is that of the browser tests. Software GL, so that every machine gives the same pictures.
 import { mkdirSync } from 'node:fs';
-import { readFile } from 'node:fs/promises';
-import { createServer } from 'node:http';
-import { extname, join, normalize } from 'node:path';
+import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { chromium } from 'playwright-core';
+import { BROWSER_ADVICE, browserArguments, findBrowser } from '../../../scripts/lib/browser.mjs';
+import { fileServer, listen } from '../../../scripts/lib/server.mjs';
 
 const dist = fileURLToPath(new URL('./dist', import.meta.url));
 const out = process.argv[2] ?? join(dist, 'pictures');
 const only = process.argv[3];
-const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.json': 'application/json' };
-
-const server = createServer(async (request, response) => {
-  const path = normalize(new URL(request.url ?? '/', 'http://x').pathname);
-  try {
-    const body = await readFile(join(dist, path === '/' ? 'index.html' : path));
-    response.writeHead(200, {
-      'content-type': TYPES[extname(path)] ?? (path === '/' ? 'text/html' : 'application/octet-stream'),
-    });
-    response.end(body);
-  } catch {
-    response.writeHead(404).end();
-  }
-});
+const SOFTWARE_GL = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
 
 const drawnAtRest = (page, since) =>
   page.waitForFunction(
@@ -133,19 +120,13 @@ async function measure(browser, url) {
 }
 
 mkdirSync(out, { recursive: true });
-await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
-const url = `http://127.0.0.1:${server.address().port}/`;
+const executablePath = findBrowser();
+if (!executablePath) throw new Error(`Missing: ${BROWSER_ADVICE}`);
+const server = fileServer(dist);
+const url = await listen(server);
 const browser = await chromium.launch({
-  executablePath: process.env.CHROME_PATH ?? '/usr/bin/chromium',
-  args: [
-    '--no-sandbox',
-    '--disable-quic',
-    '--no-first-run',
-    '--disable-background-networking',
-    '--use-gl=angle',
-    '--use-angle=swiftshader',
-    '--enable-unsafe-swiftshader',
-  ],
+  executablePath,
+  args: [...new Set([...browserArguments(), ...SOFTWARE_GL])],
 });
 try {
   if (!only || only === 'pictures') await pictures(browser, url);

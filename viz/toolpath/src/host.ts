@@ -33,7 +33,6 @@ export class ToolpathHost {
   readonly #worker: Worker | null;
   #view: ToolpathView | null = null;
   #waiting: ViewRequest[] = [];
-  readonly #ports: MessagePort[] = [];
   #disposed = false;
 
   /** Takes the canvas over for good. */
@@ -49,11 +48,6 @@ export class ToolpathHost {
     this.#worker.onerror = (event) => this.#onEvent({ type: 'failed', reason: event.message });
     const offscreen = canvas.transferControlToOffscreen();
     this.#post({ type: 'start', canvas: offscreen, size: options.size }, [offscreen]);
-  }
-
-  /** True if drawing happens in a worker. */
-  get inWorker(): boolean {
-    return this.#worker !== null;
   }
 
   setBed(bed: Bed | null): void {
@@ -104,16 +98,6 @@ export class ToolpathHost {
     this.send({ type: 'resize', size });
   }
 
-  /** Lets another worker send {@link ViewRequest}s (begin, append, end …) past the main thread. */
-  addSource(port: MessagePort): void {
-    if (this.#worker) {
-      this.#post({ type: 'source', port }, [port]);
-      return;
-    }
-    this.#ports.push(port);
-    port.onmessage = ({ data }: MessageEvent<ViewRequest>) => this.send(data);
-  }
-
   send(request: ViewRequest, transfer: Transferable[] = []): void {
     if (this.#disposed) return;
     if (this.#worker) this.#post(request, transfer);
@@ -126,7 +110,6 @@ export class ToolpathHost {
     if (this.#worker) this.#post({ type: 'dispose' }, []);
     this.#disposed = true;
     this.#view?.dispose();
-    for (const port of this.#ports) port.close();
     this.#waiting = [];
   }
 

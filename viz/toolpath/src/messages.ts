@@ -34,7 +34,6 @@ export type ViewRequest =
 export type WorkerRequest =
   | ViewRequest
   | { readonly type: 'start'; readonly canvas: OffscreenCanvas; readonly size: ViewSizePx }
-  | { readonly type: 'source'; readonly port: MessagePort }
   | { readonly type: 'dispose' };
 
 export type ViewEvent =

@@ -33,9 +33,6 @@ function receive({ data: request }: MessageEvent<WorkerRequest>): void {
   switch (request.type) {
     case 'start':
       return start(request);
-    case 'source':
-      request.port.onmessage = receive;
-      return;
     case 'dispose':
       view?.dispose();
       return scope.close();

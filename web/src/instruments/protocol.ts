@@ -1,6 +1,6 @@
 // What the page and the instruments' worker say to each other. Shapes only.
 // Times in s, temperatures in °C, speeds in mm/s, positions in CSS pixels from the canvas's upper left corner.
-import type { Celsius, Seconds } from '../units';
+import type { Seconds } from '../units';
 
 export interface CanvasSize {
   /** CSS pixels. */
@@ -9,17 +9,6 @@ export interface CanvasSize {
   /** Pixels of the canvas in a CSS pixel. */
   readonly ratio: number;
 }
-
-/** A reading of one heater. */
-export interface HeaterReading {
-  readonly at: Seconds;
-  readonly measured: Celsius;
-  /** 0 is off. */
-  readonly target: Celsius;
-}
-
-/** Numbers of a reading in a message: the heater's place among the names, s, measured °C, target °C. */
-export const READING_NUMBERS = 4;
 
 export type PointerAct =
   | { readonly kind: 'moved' | 'pressed' | 'released'; readonly x: number; readonly y: number }
@@ -38,6 +27,7 @@ export type ToInstruments =
     }
   | { readonly kind: 'size'; readonly size: CanvasSize }
   | { readonly kind: 'dark'; readonly on: boolean }
+  /** Four numbers a reading: the heater's place among the names, s, measured °C, target °C (0 is off). */
   | { readonly kind: 'temperatures'; readonly readings: Float64Array<ArrayBuffer> }
   | { readonly kind: 'speed'; readonly pairs: Float64Array<ArrayBuffer> }
   | { readonly kind: 'span'; readonly span: Seconds }

@@ -31,9 +31,13 @@ export class Feeder {
     return this.#failure;
   }
 
-  /** Feeds what is wanted and there. True when the session has something new to work on. */
+  /**
+   * Feeds what is wanted and there. True when the session has something new to work on. Nothing is fed of a file that
+   * broke off, and its end is not told: the session would take half a line for a whole one.
+   */
   feed(): boolean {
     let fed = false;
+    if (this.#failure !== undefined) return fed;
     for (let wants = this.#session.jobWants(); wants > 0 && !this.#told; wants = this.#session.jobWants()) {
       const chunk = this.#waiting[0];
       if (!chunk) {
@@ -73,7 +77,7 @@ export class Feeder {
         else this.#ended = true;
       }
     } catch (error) {
-      this.#failure = error;
+      this.#failure = error ?? new Error('no reason was given');
       this.#ended = true;
     }
   }

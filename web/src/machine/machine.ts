@@ -4,9 +4,9 @@
 // clocks nor ports.
 import { type Seconds, seconds } from '../units';
 import { Feeder } from './feeder';
-import type { FromMachine, MachineEvent, Trouble, WakeUps, Wish } from './protocol';
+import type { ConfirmedLines, FromMachine, MachineEvent, Trouble, WakeUps, Wish } from './protocol';
 import type { Session } from './session';
-import { fileUnreadable } from './troubles';
+import { fileBrokeOff, fileUnreadable, stopNotSent } from './troubles';
 
 /** Events that wait to be told; the oldest go first beyond that, and the page is told how many. */
 const EVENTS_MAX = 2000;
@@ -23,6 +23,11 @@ export class Machine {
   readonly #lineErrors: () => number;
   #feeder: Feeder | undefined;
   #starting = false;
+  /** The file of the job that waits broke off: it cannot go on. */
+  #brokenOff: Trouble | null = null;
+  /** An emergency stop that could not be sent yet. */
+  #owesStop = false;
+  #freed = false;
   #events: MachineEvent[] = [];
   #dropped = 0;
   #wakeUps: WakeUps = { missed: 0, latest: seconds(0) };
@@ -42,6 +47,7 @@ export class Machine {
   /** Does what is due: bytes for the port, and the events that came of it. */
   poll(now: Seconds): Uint8Array<ArrayBuffer> {
     this.#feed(now);
+    if (this.#owesStop) this.#owesStop = this.session.wish({ kind: 'emergency-stop' }, now) !== null;
     const bytes = this.session.poll(now);
     this.#collect();
     return bytes;
@@ -61,9 +67,10 @@ export class Machine {
     feeder.feed();
     if (feeder.failure === undefined) return;
     // What has been sent is carried out, then the machine waits where it is.
-    this.#feeder = undefined;
+    this.dropJob();
     this.session.wish({ kind: 'pause' }, now);
-    this.#push({ kind: 'trouble', trouble: fileUnreadable(feeder.failure) });
+    this.#brokenOff = fileBrokeOff(feeder.failure);
+    this.#push({ kind: 'trouble', trouble: this.#brokenOff });
   }
 
   /** Waits for the job's file where the session wants more of it than has been read. */
@@ -86,23 +93,28 @@ export class Machine {
   #collect(): void {
     for (const event of this.session.takeEvents()) {
       this.#push(event);
-      if (event.kind === 'done' || event.kind === 'cancelled') this.#dropJob();
-      else if (event.kind === 'phase' && event.phase !== 'ready') this.#dropJob();
+      if (event.kind === 'done' || event.kind === 'cancelled') this.dropJob();
+      else if (event.kind === 'phase' && event.phase !== 'ready') this.dropJob();
     }
   }
 
-  #dropJob(): void {
+  /** Lets go of the job's file, even where it is just being read. */
+  dropJob(): void {
+    this.#brokenOff = null;
     void this.#feeder?.close();
     this.#feeder = undefined;
   }
 
   /** Tells the page what happened since last time, and how things are. */
   tell(now: Seconds): void {
+    this.#collect();
     if (this.#dropped > 0) this.#events.push({ kind: 'dropped', count: this.#dropped });
     this.#dropped = 0;
     if (this.#events.length > 0) this.#tell({ kind: 'events', events: this.#events });
     this.#events = [];
     const snapshot = this.session.snapshot(now);
+    // A job that ended in an error has no event of its own.
+    if (snapshot.job === 'none') this.dropJob();
     const link = snapshot.link && { ...snapshot.link, lineErrors: this.#lineErrors() };
     this.#tell({ kind: 'snapshot', snapshot: { ...snapshot, link, wakeUps: this.#wakeUps } });
     if (!this.watchesSpeed) return;
@@ -110,33 +122,50 @@ export class Machine {
   }
 
   wish(wish: Wish, now: Seconds): Trouble | null {
+    if (wish.kind === 'resume' && this.#brokenOff) return this.#brokenOff;
+    if (wish.kind === 'emergency-stop') return this.#stop(now);
     const trouble = this.session.wish(wish, now);
     this.#collect();
     return trouble;
   }
 
+  /** Before the board has said how it is spoken to, no stop can be put into words: it is sent as soon as it can be. */
+  #stop(now: Seconds): Trouble | null {
+    const refusal = this.session.wish({ kind: 'emergency-stop' }, now);
+    this.#collect();
+    if (!refusal) return null;
+    this.#owesStop = this.session.snapshot(now).phase === 'identifying';
+    return stopNotSent(this.#owesStop ? 'identifying' : 'failed');
+  }
+
   /** Starts a print. `now` is asked for once the file is open. */
-  async print(file: Blob, confirmedLines: readonly number[], now: () => Seconds): Promise<Trouble | null> {
+  async print(file: Blob, confirmedLines: ConfirmedLines, now: () => Seconds): Promise<Trouble | null> {
     if (this.#starting) return null;
     this.#starting = true;
     try {
-      const feeder = await Feeder.open(file, this.session);
-      const trouble =
-        feeder.failure === undefined
-          ? this.session.startJob(confirmedLines, now())
-          : fileUnreadable(feeder.failure);
-      if (trouble) await feeder.close();
-      else this.#feeder = feeder;
+      const feeder = await Feeder.open(file, this.session).catch((error: unknown) => fileUnreadable(error));
+      if (!(feeder instanceof Feeder)) return feeder;
+      const trouble = this.#begin(feeder, confirmedLines, now);
+      if (trouble || this.#freed) await feeder.close();
       return trouble;
-    } catch (error) {
-      return fileUnreadable(error);
     } finally {
       this.#starting = false;
     }
   }
 
+  #begin(feeder: Feeder, confirmedLines: ConfirmedLines, now: () => Seconds): Trouble | null {
+    if (this.#freed) return null;
+    if (feeder.failure !== undefined) return fileUnreadable(feeder.failure);
+    const trouble = this.session.startJob(confirmedLines, now());
+    if (trouble) return trouble;
+    this.dropJob();
+    this.#feeder = feeder;
+    return null;
+  }
+
   free(): void {
-    this.#dropJob();
+    this.#freed = true;
+    this.dropJob();
     this.session.free();
   }
 }

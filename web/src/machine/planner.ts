@@ -8,7 +8,7 @@ import type { VirtualState } from '../bindings/VirtualState';
 import initialise, { PrinterSession, VirtualPrinter } from '../bindings/wasm/planner_wasm.js';
 import { inWords, plannerTrouble } from '../planner_error';
 import { celsius, mm, type Seconds, seconds, share } from '../units';
-import type { Axis, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
+import type { Axis, ConfirmedLines, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
 import type { Session, SessionSnapshot, SimulatedPrinter } from './session';
 
 /** Speeds of moves by hand, mm/s; the machine's own limits hold besides. */
@@ -180,8 +180,9 @@ class WasmSession implements Session {
     return refusal(() => this.#inner.request(JSON.stringify(toRequest(wish)), now));
   }
 
-  startJob(confirmedLines: readonly number[], now: Seconds): Trouble | null {
-    const request: JobRequest = { confirmed_lines: [...confirmedLines], confirm_all: false };
+  startJob(confirmedLines: ConfirmedLines, now: Seconds): Trouble | null {
+    const isAll = confirmedLines === 'all';
+    const request: JobRequest = { confirmed_lines: isAll ? [] : [...confirmedLines], confirm_all: isAll };
     return refusal(() => this.#inner.start_job(JSON.stringify(request), now));
   }
 

@@ -107,6 +107,9 @@ export type PortChoice =
       readonly faults: string;
     };
 
+/** Lines that the user wants left out; all that are not known, where there are more than can be listed. */
+export type ConfirmedLines = readonly number[] | 'all';
+
 export type ToMachine =
   | { readonly kind: 'connect'; readonly port: PortChoice; readonly config: string }
   | { readonly kind: 'disconnect' }
@@ -115,9 +118,11 @@ export type ToMachine =
       readonly kind: 'print';
       readonly id: number;
       readonly file: Blob;
-      readonly confirmedLines: readonly number[];
+      readonly confirmedLines: ConfirmedLines;
     }
   | { readonly kind: 'speed'; readonly speed: number }
+  /** A snapshot has arrived: the next may be sent. */
+  | { readonly kind: 'seen' }
   /** Whether `planned-speed` is wanted. Holds for all connections until it is changed. */
   | { readonly kind: 'watch-speed'; readonly on: boolean };
 
@@ -127,6 +132,12 @@ export type FromMachine =
   | { readonly kind: 'opened' }
   /** The connection is over; `trouble` says why, where the user did not end it. */
   | { readonly kind: 'closed'; readonly trouble: Trouble | null }
+  /**
+   * Something that nobody foresaw. The connection, if there was one, is over, its port and lock are let go of; the
+   * worker can only be replaced.
+   */
+  | { readonly kind: 'died'; readonly message: string }
+  /** The next comes only after this was `seen`: a page that is busy is not told more than it can take. */
   | { readonly kind: 'snapshot'; readonly snapshot: Snapshot }
   /** The virtual printer's own record: what its motors, heaters and switches did, whatever the session believes. */
   | { readonly kind: 'record'; readonly record: VirtualState }

@@ -19,6 +19,7 @@ export class RealTimeLoop {
   readonly #options: LoopOptions;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #stopped = false;
+  #onFailure: (error: unknown) => void = () => undefined;
 
   constructor(transport: Transport, options: LoopOptions) {
     this.#transport = transport;
@@ -27,28 +28,40 @@ export class RealTimeLoop {
     this.#reader = transport.readable.getReader();
   }
 
-  start(): void {
+  /** `onFailure` is told what was thrown by the machine. */
+  start(onFailure: (error: unknown) => void): void {
+    this.#onFailure = onFailure;
     void this.#read();
     this.tick();
   }
 
   async #read(): Promise<void> {
-    try {
-      for (;;) {
-        const { value, done } = await this.#reader.read();
-        if (done || this.#stopped) return;
+    for (;;) {
+      // The transport tells by `lost` why there is nothing more to read.
+      const { value } = await this.#reader.read().catch(() => ({ value: undefined }));
+      if (!value || this.#stopped) return;
+      this.#attempt(() => {
         this.#options.onBytes(value);
         this.#options.machine.receive(value, this.#options.now());
-        this.tick();
-      }
-    } catch {
-      // The transport tells by `lost` why there is nothing more to read.
+      });
+      this.tick();
+    }
+  }
+
+  #attempt(act: () => void): void {
+    try {
+      act();
+    } catch (error) {
+      this.#onFailure(error);
     }
   }
 
   /** Lets the session do what is due, now. */
   readonly tick = (): void => {
-    if (this.#stopped) return;
+    if (!this.#stopped) this.#attempt(() => this.#turn());
+  };
+
+  #turn(): void {
     clearTimeout(this.#timer);
     const { machine, now } = this.#options;
     const bytes = machine.poll(now());
@@ -57,10 +70,10 @@ export class RealTimeLoop {
     const wake = machine.session.wake();
     const delay = Math.max(0, (wake - now()) * 1000);
     this.#timer = setTimeout(() => {
-      machine.woke((now() - wake) as Seconds);
+      this.#attempt(() => machine.woke((now() - wake) as Seconds));
       this.tick();
     }, delay);
-  };
+  }
 
   async stop(): Promise<void> {
     if (this.#stopped) return;

@@ -2,7 +2,7 @@
 // Knows no port and no clock: bytes and time are arguments.
 import type { VirtualState } from '../bindings/VirtualState';
 import type { Seconds } from '../units';
-import type { MachineEvent, Snapshot, Trouble, Wish } from './protocol';
+import type { ConfirmedLines, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
 
 /** What a session knows of a snapshot; the rest is its owner's. */
 export type SessionSnapshot = Omit<Snapshot, 'wakeUps'>;
@@ -16,7 +16,7 @@ export interface Session {
   takeEvents(): MachineEvent[];
   /** Null where the wish is being carried out. */
   wish(wish: Wish, now: Seconds): Trouble | null;
-  startJob(confirmedLines: readonly number[], now: Seconds): Trouble | null;
+  startJob(confirmedLines: ConfirmedLines, now: Seconds): Trouble | null;
   /** How many bytes of the job's file may be fed now. */
   jobWants(): number;
   jobFeed(bytes: Uint8Array): void;

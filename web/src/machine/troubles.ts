@@ -66,12 +66,22 @@ export const portInUse = (): Trouble =>
     'Go on in that tab, or disconnect there first.',
   );
 
+/** A file that is not being printed. */
 export const fileUnreadable = (error: unknown): Trouble =>
   trouble(
     'file-unreadable',
     `The file could not be read to its end. (${detail(error)})`,
-    'The moves sent so far are carried out, then the printer pauses with its position known and its heaters as they were.',
-    'Make the file readable again (disk, network drive, permission) and drop it anew; cancel the print that waits.',
+    'Nothing of it was sent to the printer.',
+    'Make the file readable again (disk, network drive, permission) and drop it anew. A file that was saved again has to be dropped again, too.',
+  );
+
+/** A file that is being printed. */
+export const fileBrokeOff = (error: unknown): Trouble =>
+  trouble(
+    'file-unreadable',
+    `The file that is being printed could not be read to its end. (${detail(error)})`,
+    'The moves sent so far are carried out, then the print waits with its position known. The heaters stay on until it is cancelled.',
+    'Cancel the print: it cannot go on, since the rest of its file is not known. A file that was saved again, moved or deleted has to be dropped anew.',
   );
 
 export const notGcode = (todo: string): Trouble =>
@@ -85,12 +95,45 @@ export const plannerMissing = (error: unknown): Trouble =>
     'Reload the page. If it stays so, the page was not copied completely, or the browser forbids WebAssembly.',
   );
 
-export const workerDied = (message: string): Trouble =>
+/** `port` is what was connected; null for nothing. */
+export const workerDied = (message: string, port: 'serial' | 'virtual' | null): Trouble =>
   trouble(
     'worker-died',
     `The part of the page that drives the printer has stopped. (${message})`,
-    ON_ITS_OWN,
-    'Look at the printer, reload the page, connect and home. Please report it with the diagnostic report.',
+    {
+      serial: ON_ITS_OWN,
+      virtual: 'The virtual printer was a part of the page and is gone with it.',
+      none: 'No printer was connected.',
+    }[port ?? 'none'],
+    port === 'serial'
+      ? 'Look at the printer first, then connect again and home; a print does not start again by itself. Please report it with the diagnostic report.'
+      : 'It has been started anew: connect again. Please report it with the diagnostic report.',
+  );
+
+export const previewDied = (message: string): Trouble =>
+  trouble(
+    'preview-died',
+    `The part of the page that reads files has stopped. (${message})`,
+    'It does not drive the printer: a running print is not touched.',
+    'Open the file again; reload the page where that does not help. If it stops again, please report it with the diagnostic report.',
+  );
+
+const STOP_REASONS = {
+  'not-open': 'the port is not open',
+  identifying: 'the board has not said yet how it is spoken to',
+  failed: 'the connection to the board has failed',
+  'no-answer': 'the part of the page that drives the printer does not answer',
+} as const;
+
+/** An emergency stop that did not reach the printer, as far as is known. */
+export const stopNotSent = (reason: keyof typeof STOP_REASONS): Trouble =>
+  trouble(
+    'stop-not-sent',
+    `No emergency stop could be sent: ${STOP_REASONS[reason]}.`,
+    reason === 'identifying'
+      ? 'The stop is sent as soon as the board has said it. Until then nothing is known of what the printer does.'
+      : 'Nothing is known of what the printer does. A board without orders switches its heaters off within 3 seconds and stops when its queue of moves is empty.',
+    'If the printer moves or heats, cut its power now.',
   );
 
 const ANSWERS: Partial<Record<AnswerKind, readonly [string, string]>> = {

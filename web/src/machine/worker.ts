@@ -2,39 +2,27 @@
 //
 // Nothing here waits for the page. A Web Lock is held from before the port is opened to after it is closed, so that
 // one tab has a printer; a tab that holds a lock is not frozen either.
-import type { VirtualState } from '../bindings/VirtualState';
 import { ANSWER_BYTES_MAX, classify } from '../transport/answer';
 import { PortError } from '../transport/transport';
 import { find, openSerial } from '../transport/web_serial';
 import { type Seconds, seconds } from '../units';
+import { Connection, Died, type Parts } from './connection';
 import { LockstepLoop } from './lockstep';
 import { Machine } from './machine';
 import { loadPlanner, type Planner } from './planner';
-import type { FromMachine, PortChoice, ToMachine, Trouble } from './protocol';
+import type { FromMachine, PortChoice, ToMachine, Trouble, Wish } from './protocol';
 import { RealTimeLoop } from './realtime';
-import { answerTrouble, plannerMissing, portInUse, portTrouble, workerDied } from './troubles';
+import { answerTrouble, plannerMissing, portInUse, portTrouble, stopNotSent } from './troubles';
 
-/** How often the page is told how things are, in ms. */
-const TELL_MS = 100;
 /** Errors for which the first bytes may know a better reason. */
 const UNIDENTIFIED = new Set(['board-silent', 'board-unreadable', 'wrong-firmware']);
-
-interface Connection {
-  readonly machine: Machine;
-  readonly now: () => Seconds;
-  readonly tick: () => void;
-  readonly setSpeed: (speed: number) => void;
-  /** The printer's own record, where it is a virtual one. */
-  readonly record: (() => VirtualState) | null;
-  /** Ends the connection; the lock is let go after it. */
-  readonly end: (trouble: Trouble | null) => Promise<void>;
-}
 
 const scope = self as unknown as { postMessage(message: FromMachine, transfer: Transferable[]): void };
 const realNow = (): Seconds => seconds(performance.now() / 1000);
 
 let planner: Planner | undefined;
 let connection: Connection | undefined;
+/** From before the port is opened until after it is closed. */
 let opening: { cancelled: boolean } | undefined;
 /** Whether the page shows the planned speed; outlives connections. */
 let watchesSpeed = false;
@@ -67,33 +55,15 @@ async function withLock(name: string, body: () => Promise<Trouble | null>): Prom
   return await navigator.locks.request(name, { ifAvailable: true }, (lock) => (lock ? body() : portInUse()));
 }
 
-/** The loop is up: tells the page, until the connection is over; returns why it is. */
-function hold(
-  make: (over: (trouble: Trouble | null) => void) => Omit<Connection, 'end'> & { stop: () => Promise<void> },
-): Promise<Trouble | null> {
-  return new Promise((resolve) => {
-    let over = false;
-    const end = async (trouble: Trouble | null): Promise<void> => {
-      if (over) return;
-      over = true;
-      clearInterval(timer);
-      connection = undefined;
-      // While there still is a clock to ask: stopping lets go of the virtual printer.
-      tellAll();
-      await parts.stop();
-      parts.machine.free();
-      resolve(trouble);
-    };
-    const parts = make((trouble) => void end(trouble));
-    connection = { ...parts, end };
-    parts.machine.watchesSpeed = watchesSpeed;
-    const tellAll = (): void => {
-      parts.machine.tell(parts.now());
-      if (parts.record) tell({ kind: 'record', record: parts.record() });
-    };
-    const timer = setInterval(tellAll, TELL_MS);
-    tell({ kind: 'opened' });
-  });
+/** Goes on until the connection is over; returns why it is. */
+async function hold(parts: Parts): Promise<Trouble | null> {
+  parts.machine.watchesSpeed = watchesSpeed;
+  connection = new Connection(parts, tell);
+  try {
+    return await connection.run();
+  } finally {
+    connection = undefined;
+  }
 }
 
 async function connectSerial(
@@ -117,27 +87,25 @@ async function connectSerial(
       return null;
     }
     const first = new FirstBytes();
-    return await hold((over) => {
-      const machine = new Machine(
-        session,
-        (message) => tell(first.explain(message)),
-        () => transport.lineErrors(),
-      );
-      const loop = new RealTimeLoop(transport, {
-        machine,
-        now: realNow,
-        onBytes: (bytes) => first.take(bytes),
-      });
-      void transport.lost.then((error) => over(portTrouble(error)));
-      loop.start();
-      return {
-        machine,
-        now: realNow,
-        tick: loop.tick,
-        setSpeed: () => undefined,
-        record: null,
-        stop: () => loop.stop(),
-      };
+    const machine = new Machine(
+      session,
+      (message) => tell(first.explain(message)),
+      () => transport.lineErrors(),
+    );
+    const loop = new RealTimeLoop(transport, {
+      machine,
+      now: realNow,
+      onBytes: (bytes) => first.take(bytes),
+    });
+    return await hold({
+      machine,
+      now: realNow,
+      tick: loop.tick,
+      setSpeed: () => undefined,
+      record: null,
+      lost: transport.lost.then(portTrouble),
+      start: (onFailure) => loop.start(onFailure),
+      stop: () => loop.stop(),
     });
   });
 }
@@ -148,36 +116,49 @@ async function connectVirtual(
   config: string,
 ): Promise<Trouble | null> {
   // Every tab has a printer of its own; the lock only keeps the tab from being frozen.
-  return await withLock(`stepcast-virtual:${crypto.randomUUID()}`, () =>
-    hold((over) => {
-      const printer = loaded.powerUp(config, choice.board, choice.seed, choice.faults);
-      const now = (): Seconds => printer.now();
-      const session = loaded.openVirtualSession(config, choice.board, now());
-      const machine = new Machine(session, tell, () => 0);
-      const loop = new LockstepLoop(machine, printer, choice.speed, realNow);
-      loop.start((error) => over(workerDied(String(error))));
-      return {
-        machine,
-        now,
-        tick: loop.tick,
-        setSpeed: (speed) => loop.setSpeed(speed),
-        record: () => printer.record(),
-        stop: () => loop.stop(),
-      };
-    }),
-  );
+  return await withLock(`stepcast-virtual:${crypto.randomUUID()}`, async () => {
+    if (opening?.cancelled) return null;
+    const printer = loaded.powerUp(config, choice.board, choice.seed, choice.faults);
+    const now = (): Seconds => printer.now();
+    const session = loaded.openVirtualSession(config, choice.board, now());
+    const machine = new Machine(session, tell, () => 0);
+    const loop = new LockstepLoop(machine, printer, choice.speed, realNow);
+    return await hold({
+      machine,
+      now,
+      tick: loop.tick,
+      setSpeed: (speed) => loop.setSpeed(speed),
+      record: () => printer.record(),
+      lost: null,
+      start: (onFailure) => loop.start(onFailure),
+      stop: () => loop.stop(),
+    });
+  });
 }
 
 async function connect(message: ToMachine & { kind: 'connect' }): Promise<void> {
   if (connection || opening) return;
   opening = { cancelled: false };
-  const trouble = await carryOut(message);
-  // Only now, with port and lock let go of, may the page ask for the next connection.
-  opening = undefined;
-  tell({ kind: 'closed', trouble });
+  try {
+    const trouble = await carryOut(message);
+    // Only now, with port and lock let go of, may the page ask for the next connection.
+    opening = undefined;
+    tell({ kind: 'closed', trouble });
+  } catch (error) {
+    died(error);
+  }
 }
 
-/** A connection from its beginning to its end; why it ended. */
+const died = (error: unknown): void => tell({ kind: 'died', message: new Died(error).message });
+
+/** Something was thrown where nobody caught it: with a connection, that ends first. */
+function uncaught(error: unknown): void {
+  if (!connection) died(error);
+  // One that is ending lets go of everything by itself.
+  else connection.fail(error);
+}
+
+/** A connection from its beginning to its end; why it ended. Rejects where the planner cannot be relied on any more. */
 async function carryOut(message: ToMachine & { kind: 'connect' }): Promise<Trouble | null> {
   try {
     const loaded = await load();
@@ -185,6 +166,7 @@ async function carryOut(message: ToMachine & { kind: 'connect' }): Promise<Troub
       ? await connectSerial(loaded, message.port, message.config)
       : await connectVirtual(loaded, message.port, message.config);
   } catch (error) {
+    if (error instanceof Died || error instanceof WebAssembly.RuntimeError) throw error;
     return planner ? (planner.asTrouble(error) ?? portTrouble(error)) : plannerMissing(error);
   }
 }
@@ -194,15 +176,30 @@ async function load(): Promise<Planner> {
   return planner;
 }
 
-async function answer(
-  id: number,
-  act: (connection: Connection) => Promise<Trouble | null> | Trouble | null,
-): Promise<void> {
+function wish(id: number, wanted: Wish): void {
+  if (connection && !connection.isOver) {
+    connection.attempt(({ machine, now, tick }) => {
+      tell({ kind: 'answer', id, trouble: machine.wish(wanted, now()) });
+      tick();
+    });
+    return;
+  }
+  const isStop = wanted.kind === 'emergency-stop';
+  // Who wants everything to stop does not want what is just being opened.
+  if (isStop && opening) opening.cancelled = true;
+  tell({ kind: 'answer', id, trouble: isStop ? stopNotSent('not-open') : null });
+}
+
+async function print({ id, file, confirmedLines }: ToMachine & { kind: 'print' }): Promise<void> {
   const current = connection;
-  if (!current) return tell({ kind: 'answer', id, trouble: null });
-  const trouble = await act(current);
-  tell({ kind: 'answer', id, trouble });
-  current.tick();
+  const parts = current?.parts;
+  if (!current || !parts) return tell({ kind: 'answer', id, trouble: null });
+  try {
+    tell({ kind: 'answer', id, trouble: await parts.machine.print(file, confirmedLines, parts.now) });
+  } catch (error) {
+    current.fail(error);
+  }
+  current.attempt(({ tick }) => tick());
 }
 
 self.onmessage = ({ data }: MessageEvent<ToMachine>): void => {
@@ -211,24 +208,36 @@ self.onmessage = ({ data }: MessageEvent<ToMachine>): void => {
       void connect(data);
       break;
     case 'disconnect':
-      if (connection) void connection.end(null);
+      if (connection) connection.end(null);
       else if (opening) opening.cancelled = true;
       break;
     case 'wish':
-      void answer(data.id, ({ machine, now }) => machine.wish(data.wish, now()));
+      wish(data.id, data.wish);
       break;
     case 'print':
-      void answer(data.id, ({ machine, now }) => machine.print(data.file, data.confirmedLines, now));
+      void print(data);
       break;
     case 'speed':
-      connection?.setSpeed(data.speed);
+      connection?.attempt(({ setSpeed }) => setSpeed(data.speed));
+      break;
+    case 'seen':
+      connection?.seen();
       break;
     case 'watch-speed':
       watchesSpeed = data.on;
-      if (connection) connection.machine.watchesSpeed = data.on;
+      if (connection) connection.parts.machine.watchesSpeed = data.on;
       break;
   }
 };
+
+self.addEventListener('error', (event) => {
+  event.preventDefault();
+  uncaught(event.error ?? event.message);
+});
+self.addEventListener('unhandledrejection', (event) => {
+  event.preventDefault();
+  uncaught(event.reason);
+});
 
 load().then(
   () => tell({ kind: 'loaded' }),

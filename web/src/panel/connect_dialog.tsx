@@ -4,19 +4,19 @@ import type { JSX } from 'preact';
 import { useEffect, useId } from 'preact/hooks';
 import { connect, plannerFailed, plannerLoaded, refusePort } from '../state/machine';
 import { activeProfile, profiles, SHIPPED } from '../state/profiles';
-import { change, SPEED_MAX, settings } from '../state/settings';
+import { change, settings } from '../state/settings';
 import { identify, type PortId } from '../transport/web_serial';
 import { faultProblem } from './faults';
 import { machineSummary } from './machine_summary';
 import { Button, Choice, Dialog, NumberField } from './parts';
 import { openDialog } from './top_bar';
+import { VirtualSpeed } from './virtual_speed';
 
 const HAS_SERIAL = 'serial' in navigator;
 const FAULTS_EXAMPLE = 'sensor-open=extruder@90';
 const FAULTS_CHARACTERS_MAX = 500;
 const FAULTS_HINT =
   'What breaks, and at which second after power-up: sensor-open, sensor-short, heater-dead, heater-stuck-on (=extruder or heater_bed), endstop-stuck-on, endstop-stuck-off (=x, y or z), unplug, replug. Damage to the bytes all the time: corrupt, drop, duplicate, delay (=probability). Several are separated by commas.';
-const SPEEDS = [1, 5, 20, SPEED_MAX] as const;
 
 const known = signal<readonly SerialPort[]>([]);
 const chosen = signal<SerialPort | null>(null);
@@ -31,11 +31,41 @@ function nameOf({ vendor, product, index }: PortId): string {
   return index > 0 ? `${kind}, number ${index + 1}` : kind;
 }
 
+/** The ports that are there; undefined where the browser does not tell. */
+async function list(): Promise<readonly SerialPort[] | undefined> {
+  try {
+    return (await navigator.serial.getPorts()).filter((port) => port.connected !== false);
+  } catch (error) {
+    refusePort(error);
+    notice.value = 'The browser does not tell which ports there are. Reload the page, then try again.';
+    return undefined;
+  }
+}
+
+/** A port that is gone is chosen no longer, and no other takes its place unasked: that may be another printer. */
 async function look(): Promise<void> {
-  known.value = await navigator.serial.getPorts();
-  // A known port is offered; when there is only one it is the choice, and still somebody has to press the button.
+  known.value = (await list()) ?? [];
+  if (chosen.value === null || known.value.includes(chosen.value)) return;
+  chosen.value = null;
+  notice.value = 'The port that was chosen is no longer there: plug the printer in again, or choose a port.';
+}
+
+/** A known port is offered; when there is only one it is the choice, and still somebody has to press the button. */
+async function offer(): Promise<void> {
+  known.value = (await list()) ?? [];
   if (chosen.value && known.value.includes(chosen.value)) return;
   chosen.value = known.value.length === 1 ? (known.value[0] ?? null) : null;
+}
+
+/** Keeps the list true while the dialog is open. */
+function followPorts(): () => void {
+  const changed = (): void => void look();
+  for (const type of ['connect', 'disconnect'] as const) navigator.serial.addEventListener(type, changed);
+  void offer();
+  return () => {
+    for (const type of ['connect', 'disconnect'] as const)
+      navigator.serial.removeEventListener(type, changed);
+  };
 }
 
 async function choose(): Promise<void> {
@@ -56,12 +86,15 @@ async function choose(): Promise<void> {
   }
 }
 
-function go(): void {
+async function go(): Promise<void> {
   const { connectTo, baud, speed } = settings.value;
   const { config } = activeProfile.value;
   if (connectTo === 'virtual' || !HAS_SERIAL) {
     connect({ kind: 'virtual', board: 'rp2040', speed, seed: 1, faults: faults.value.trim() }, config);
-  } else if (chosen.value) {
+  } else {
+    // The worker finds the port by its place among those of its kind: that has to be its place now.
+    await look();
+    if (!chosen.value || openDialog.value !== 'connect') return;
     connect({ kind: 'serial', id: identify(chosen.value, known.value), baud }, config);
   }
   openDialog.value = null;
@@ -80,7 +113,10 @@ function Ports(): JSX.Element {
                 type="radio"
                 name="port"
                 checked={chosen.value === port}
-                onChange={() => (chosen.value = port)}
+                onChange={() => {
+                  chosen.value = port;
+                  notice.value = null;
+                }}
               />
               {nameOf(identify(port, ports))}
             </label>
@@ -118,12 +154,7 @@ function Virtual(): JSX.Element {
         A whole printer inside this page: the same firmware, heaters that warm up, motors that move. Nothing
         real gets warm. It is built from the machine file in use and is gone when the page is closed.
       </p>
-      <Choice
-        label="Speed"
-        choices={SPEEDS.map((value) => ({ value, text: value === 1 ? 'Real time' : `up to ${value}×` }))}
-        value={(SPEEDS.find((value) => value === settings.value.speed) ?? 1) as (typeof SPEEDS)[number]}
-        onSet={(speed) => change({ speed })}
-      />
+      <VirtualSpeed label="Speed" />
       <details class="more">
         <summary>Try faults out</summary>
         <div class="stack">
@@ -168,7 +199,7 @@ export function ConnectDialog(): JSX.Element {
   const why = obstacle(isSerial);
   useEffect(() => {
     notice.value = null;
-    if (HAS_SERIAL) void look();
+    return HAS_SERIAL ? followPorts() : undefined;
   }, []);
   return (
     <Dialog title="Connect" onClose={() => (openDialog.value = null)}>
@@ -176,7 +207,7 @@ export function ConnectDialog(): JSX.Element {
         class="stack"
         onSubmit={(event) => {
           event.preventDefault();
-          if (why === null) go();
+          if (why === null) void go();
         }}
       >
         {HAS_SERIAL ? (

@@ -4,6 +4,7 @@ import type { JSX } from 'preact';
 import { connection, emergencyStop, plannerLoaded } from '../state/machine';
 import { Icon } from './icons';
 import { Dialog, type DialogProps } from './parts';
+import { TroubleInDialog } from './trouble_banner';
 
 export function EmergencyStop(): JSX.Element {
   const isOff = connection.value === 'closed' || !plannerLoaded.value;
@@ -13,7 +14,7 @@ export function EmergencyStop(): JSX.Element {
       class="emergency"
       aria-label="Emergency stop"
       title={isOff ? 'Nothing is connected' : 'Stops the motors and switches the heaters off, at once'}
-      onClick={emergencyStop}
+      onClick={() => void emergencyStop()}
       disabled={isOff}
     >
       <Icon name="stop" />
@@ -24,7 +25,12 @@ export function EmergencyStop(): JSX.Element {
   );
 }
 
-/** A dialog that leaves the emergency stop within reach. */
+/** A dialog that leaves the emergency stop within reach, and tells what goes wrong meanwhile. */
 export function PanelDialog(props: Omit<DialogProps, 'aside'>): JSX.Element {
-  return <Dialog {...props} aside={connection.value === 'closed' ? null : <EmergencyStop />} />;
+  return (
+    <Dialog {...props} aside={connection.value === 'closed' ? null : <EmergencyStop />}>
+      <TroubleInDialog />
+      {props.children}
+    </Dialog>
+  );
 }

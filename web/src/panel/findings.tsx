@@ -2,8 +2,9 @@
 import type { JSX } from 'preact';
 import type { Trouble } from '../machine/protocol';
 import type { Remark } from '../preview/protocol';
+import { confirmGroup, type Group, groups, isConfirmed, rest } from '../state/confirm';
 import { isPrinting } from '../state/machine';
-import { confirmed, confirmLine, failure, file, summary } from '../state/preview';
+import { failure, file, summary } from '../state/preview';
 import { Icon } from './icons';
 import { formatNumber } from './numbers';
 
@@ -11,13 +12,15 @@ import { formatNumber } from './numbers';
 const SHOWN_MAX = 100;
 /** Of errors of one kind. */
 const ALIKE_MAX = 3;
+/** Of lines that have to be confirmed together. */
+const LINES_NAMED_MAX = 5;
 /** As many as the check keeps. */
 const ERRORS_MAX = 1000;
 
 const lineText = (line: number | null): string => (line ? `Line ${formatNumber(line)}` : 'The file');
 
 /** The same thing wrong in many lines is one thing to do. */
-function groups(errors: readonly Trouble[]): Trouble[][] {
+function alike(errors: readonly Trouble[]): Trouble[][] {
   const byCode = new Map<string, Trouble[]>();
   for (const error of errors) byCode.set(error.code, [...(byCode.get(error.code) ?? []), error]);
   return [...byCode.values()];
@@ -26,7 +29,7 @@ function groups(errors: readonly Trouble[]): Trouble[][] {
 function Errors({ errors }: { readonly errors: readonly Trouble[] }): JSX.Element {
   return (
     <ul class="findings bad" aria-label="What stops the print">
-      {groups(errors.slice(0, ERRORS_MAX)).map((group) => (
+      {alike(errors.slice(0, ERRORS_MAX)).map((group) => (
         <li key={group[0]?.code}>
           <Icon name="warning" />
           <div>
@@ -46,22 +49,36 @@ function Errors({ errors }: { readonly errors: readonly Trouble[] }): JSX.Elemen
   );
 }
 
-function Blocking({ lines }: { readonly lines: readonly Remark[] }): JSX.Element {
+function linesText(lines: readonly number[]): string {
+  if (lines.length === 1) return lineText(lines[0] ?? null);
+  const named = lines.slice(0, LINES_NAMED_MAX).map((line) => formatNumber(line));
+  const more = lines.length - named.length;
+  return `Lines ${named.join(', ')}${more > 0 ? ` and ${formatNumber(more)} more` : ''}`;
+}
+
+function Asking({ group, name }: { readonly group: Group; readonly name: string }): JSX.Element {
+  return (
+    <label class="check">
+      <input
+        type="checkbox"
+        checked={isConfirmed(group)}
+        onChange={(event) => confirmGroup(group, event.currentTarget.checked)}
+      />
+      <span>
+        <strong>{name}</strong> {group.text}
+      </span>
+    </label>
+  );
+}
+
+function Blocking(): JSX.Element {
   return (
     <fieldset class="findings asks" disabled={isPrinting.value}>
-      <legend>These lines are not known and will be left out. Confirm each one:</legend>
-      {lines.slice(0, SHOWN_MAX).map(({ line, text }) => (
-        <label key={line} class="check">
-          <input
-            type="checkbox"
-            checked={confirmed.value.has(line)}
-            onChange={(event) => confirmLine(line, event.currentTarget.checked)}
-          />
-          <span>
-            <strong>{lineText(line)}</strong> {text}
-          </span>
-        </label>
+      <legend>These commands are not known and will be left out. Confirm each one:</legend>
+      {groups.value.map((group) => (
+        <Asking key={group.text} group={group} name={linesText(group.lines)} />
       ))}
+      {rest.value && <Asking group={rest.value} name="More lines" />}
     </fieldset>
   );
 }
@@ -90,7 +107,7 @@ export function Findings(): JSX.Element | null {
   return (
     <>
       {found.errors.length > 0 && <Errors errors={found.errors} />}
-      {found.blocking.length > 0 && <Blocking lines={found.blocking} />}
+      {found.blocking.length > 0 && <Blocking />}
       {remarks.length > 0 && <Remarks remarks={remarks} />}
     </>
   );

@@ -1,18 +1,10 @@
 // The file as a print: what it takes, what stands against it, and starting, pausing, ending it.
-import { computed } from '@preact/signals';
+import { computed, effect, signal } from '@preact/signals';
 import type { ComponentChildren, JSX } from 'preact';
 import type { Summary } from '../preview/protocol';
+import { unconfirmed } from '../state/confirm';
 import { connection, isPrinting, isReady, job, outcome, snapshot, wish } from '../state/machine';
-import {
-  closeFile,
-  failure,
-  file,
-  type OpenFile,
-  openFile,
-  reading,
-  summary,
-  unconfirmed,
-} from '../state/preview';
+import { closeFile, failure, file, type OpenFile, openFile, reading, summary } from '../state/preview';
 import {
   finishesIn,
   heatingUp,
@@ -44,8 +36,8 @@ const obstacle = computed<string | null>(() => {
   const open = unconfirmed.value.length;
   if (open > 0)
     return open === 1
-      ? 'A line has to be confirmed first: see below.'
-      : `${open} lines have to be confirmed first: see below.`;
+      ? 'A command has to be confirmed first: see below.'
+      : `${open} commands have to be confirmed first: see below.`;
   return null;
 });
 
@@ -144,8 +136,43 @@ function waiting(): string | null {
     : null;
 }
 
+/** Longer than between the two halves of a double click, in ms. */
+const DOUBLE_CLICK_MS = 500;
+/** Whether what was pressed last is still being done. */
+const isUnderWay = signal(false);
+
+/** Resolves with the next news of the machine, or with the end of the connection. */
+function nextSnapshot(): Promise<void> {
+  const before = snapshot.peek();
+  return new Promise((resolve) => {
+    const stop = effect(() => {
+      if (snapshot.value === before && connection.value !== 'closed') return;
+      resolve();
+      queueMicrotask(() => stop());
+    });
+  });
+}
+
+/**
+ * Print, Pause and Resume stand in one place: until the first is done and a double click is over, a press means none of
+ * them.
+ */
+async function once(act: () => Promise<unknown>): Promise<void> {
+  if (isUnderWay.value) return;
+  isUnderWay.value = true;
+  const pause = new Promise((resolve) => setTimeout(resolve, DOUBLE_CLICK_MS));
+  try {
+    await act();
+    await nextSnapshot();
+    await pause;
+  } finally {
+    isUnderWay.value = false;
+  }
+}
+
 function Actions(): JSX.Element {
   const state = job.value;
+  const busy = isUnderWay.value;
   if (state === 'none') {
     const again = outcome.value !== null && isShown.value;
     return (
@@ -153,9 +180,10 @@ function Actions(): JSX.Element {
         kind="primary"
         icon="play"
         class="big"
+        busy={busy}
         why={obstacle.value}
         onClick={() => {
-          if (obstacle.value === null) void printShown();
+          if (obstacle.value === null) void once(printShown);
         }}
       >
         {again ? 'Print again' : 'Print'}
@@ -166,11 +194,23 @@ function Actions(): JSX.Element {
   return (
     <>
       {state === 'paused' || state === 'held' ? (
-        <Button kind="primary" icon="play" class="big" onClick={() => void wish({ kind: 'resume' })}>
+        <Button
+          kind="primary"
+          icon="play"
+          class="big"
+          busy={busy}
+          onClick={() => void once(() => wish({ kind: 'resume' }))}
+        >
           Resume
         </Button>
       ) : (
-        <Button icon="pause" class="big" disabled={isBusy} onClick={() => void wish({ kind: 'pause' })}>
+        <Button
+          icon="pause"
+          class="big"
+          busy={busy}
+          disabled={isBusy}
+          onClick={() => void once(() => wish({ kind: 'pause' }))}
+        >
           {state === 'pausing' ? 'Pausing' : 'Pause'}
         </Button>
       )}

@@ -18,6 +18,16 @@ export function formatNumber(value: number, decimals = 0, minimum = decimals): s
   return format.format(rounded === 0 ? 0 : rounded);
 }
 
+/** A number as it stands in a field: without groups, which a lone one could not be told from decimals in. */
+export function formatPlain(value: number, decimals = 0): string {
+  const rounded = Number(value.toFixed(decimals));
+  return new Intl.NumberFormat(undefined, {
+    useGrouping: false,
+    numberingSystem: 'latn',
+    maximumFractionDigits: decimals,
+  }).format(rounded === 0 ? 0 : rounded);
+}
+
 /** The decimal sign of the user's language. */
 export function decimalSign(): string {
   const parts = new Intl.NumberFormat().formatToParts(0.5);

@@ -2,7 +2,7 @@
 // machine's file goes by its name.
 
 import sampleUrl from '../../../samples/test-part.gcode?url';
-import { connection } from '../state/machine';
+import { connection, trouble } from '../state/machine';
 import { openFile } from '../state/preview';
 import { importProfile } from '../state/profiles';
 import { openDialog } from './top_bar';
@@ -22,10 +22,23 @@ export function pickFile(): void {
   input.click();
 }
 
+const SAMPLE_MISSING = {
+  code: 'sample-missing',
+  line: null,
+  happened: 'The sample could not be loaded.',
+  safe: 'Nothing moves, nothing is switched on by it.',
+  todo: 'Check that the server of this page still runs, then try again; or open a file of your own.',
+};
+
 /** Opens the test part that is shipped. */
 export async function openSample(): Promise<void> {
-  const response = await fetch(sampleUrl);
-  if (response.ok) openFile(await response.blob(), 'test-part.gcode');
+  try {
+    const response = await fetch(sampleUrl);
+    if (!response.ok) throw new Error(response.statusText);
+    openFile(await response.blob(), 'test-part.gcode');
+  } catch {
+    trouble.value = SAMPLE_MISSING;
+  }
 }
 
 /** The first file of a drop: a print, or a machine, which becomes a profile of its own. */

@@ -1,8 +1,8 @@
 // Small parts that all panels are made of. Know nothing of printers.
-import type { ComponentChildren, JSX } from 'preact';
+import type { ComponentChildren, JSX, RefObject } from 'preact';
 import { useEffect, useId, useRef, useState } from 'preact/hooks';
 import { Icon, type IconName } from './icons';
-import { formatNumber, parseNumber } from './numbers';
+import { formatPlain, parseNumber } from './numbers';
 
 interface CardProps {
   readonly title: string;
@@ -34,7 +34,10 @@ interface ButtonProps {
   /** Why the button cannot be used now; null where it can. */
   readonly why?: string | null;
   readonly pressed?: boolean;
+  /** Presses are passed over for now. Keeps the focus, which a disabled button loses. */
+  readonly busy?: boolean;
   readonly class?: string;
+  readonly place?: RefObject<HTMLButtonElement | null>;
 }
 
 /** A button; with `label` instead of words it is an icon with a name. */
@@ -47,14 +50,18 @@ export function Button({
   disabled,
   why,
   pressed,
+  busy = false,
   class: more = '',
+  place,
 }: ButtonProps): JSX.Element {
   return (
     <button
+      ref={place ?? null}
       type="button"
       class={`button ${kind} ${children ? '' : 'only-icon'} ${more}`}
-      onClick={onClick}
+      onClick={() => !busy && onClick()}
       disabled={disabled || Boolean(why)}
+      aria-disabled={busy || undefined}
       aria-label={label}
       aria-pressed={pressed}
       title={why ?? (children ? undefined : label)}
@@ -76,25 +83,56 @@ interface NumberFieldProps {
   /** Why the field cannot be used now; null where it can. */
   readonly why?: string | null;
   readonly hideLabel?: boolean;
-  /** Called with a number between `min` and `max`, on Enter and on leaving the field after a change. */
+  /** What is set acts on the machine: only Enter and the button pass it on, and leaving the field puts it away. */
+  readonly acts?: boolean;
+  /** Called with a number between `min` and `max`: on Enter, and, unless it `acts`, on leaving the field after a change. */
   readonly onSet: (value: number) => void;
+}
+
+interface Draft {
+  /** What is typed and not yet set. */
+  readonly text: string | null;
+  readonly isWrong: boolean;
+  readonly set: (text: string | null) => void;
+  readonly commit: () => void;
+  readonly leave: () => void;
+}
+
+function useDraft({ value, min, max, acts, onSet }: NumberFieldProps, isOff: boolean): Draft {
+  const [text, set] = useState<string | null>(null);
+  const number = text === null ? value : parseNumber(text);
+  const isWrong = number === undefined || number < min || number > max;
+  // A field that is switched off is not left: the browser says nothing.
+  useEffect(() => {
+    if (isOff) set(null);
+  }, [isOff]);
+  const commit = (): void => {
+    if (text === null || isWrong || isOff) return;
+    set(null);
+    onSet(number);
+  };
+  const leave = (): void => {
+    if (!acts) commit();
+    set(null);
+  };
+  return { text, isWrong, set, commit, leave };
 }
 
 /** A number to type, with its unit; what is no number, or out of range, is said and not passed on. */
 export function NumberField(props: NumberFieldProps): JSX.Element {
-  const { label, unit, value, min, max, decimals = 0, disabled, why, hideLabel, onSet } = props;
+  const { label, unit, value, min, max, decimals = 0, disabled, why, hideLabel, acts } = props;
   const id = useId();
-  const [draft, setDraft] = useState<string | null>(null);
-  const number = draft === null ? value : parseNumber(draft);
-  const isWrong = number === undefined || number < min || number > max;
-  const hint = `From ${formatNumber(min, decimals, 0)} to ${formatNumber(max, decimals, 0)} ${unit}`;
-  const commit = (): void => {
-    if (draft === null || isWrong) return;
-    setDraft(null);
-    onSet(number);
-  };
+  const isOff = Boolean(disabled || why);
+  const { text, isWrong, set, commit, leave } = useDraft(props, isOff);
+  const hint = `From ${formatPlain(min, decimals)} to ${formatPlain(max, decimals)} ${unit}`;
   return (
-    <span class="number-field">
+    <span
+      class="number-field"
+      onFocusOut={(event) => {
+        const to = event.relatedTarget;
+        if (!(to instanceof Node && event.currentTarget.contains(to))) leave();
+      }}
+    >
       <label for={id} class={hideLabel ? 'unseen' : ''}>
         {label}
       </label>
@@ -104,30 +142,30 @@ export function NumberField(props: NumberFieldProps): JSX.Element {
           type="text"
           inputMode="decimal"
           autocomplete="off"
-          value={draft ?? formatNumber(value, decimals, 0)}
-          disabled={disabled || Boolean(why)}
+          value={text ?? formatPlain(value, decimals)}
+          disabled={isOff}
           title={why ?? undefined}
           aria-invalid={isWrong}
           aria-describedby={isWrong ? `${id}-hint` : undefined}
           onFocus={(event) => event.currentTarget.select()}
-          onInput={(event) => setDraft(event.currentTarget.value)}
-          onBlur={() => {
-            commit();
-            setDraft(null);
-          }}
+          onInput={(event) => set(event.currentTarget.value)}
           onKeyDown={(event) => {
             if (event.key === 'Enter') {
               event.preventDefault();
               commit();
-            } else if (event.key === 'Escape' && draft !== null) {
+            } else if (event.key === 'Escape' && text !== null) {
               event.stopPropagation();
-              setDraft(null);
+              set(null);
             }
           }}
         />
-        <span class="unit" aria-hidden="true">
-          {unit}
-        </span>
+        {acts && text !== null ? (
+          <SetButton label={label} disabled={isWrong} onClick={commit} />
+        ) : (
+          <span class="unit" aria-hidden="true">
+            {unit}
+          </span>
+        )}
       </span>
       {isWrong && (
         <span class="field-hint" id={`${id}-hint`}>
@@ -135,6 +173,29 @@ export function NumberField(props: NumberFieldProps): JSX.Element {
         </span>
       )}
     </span>
+  );
+}
+
+interface SetButtonProps {
+  readonly label: string;
+  readonly disabled: boolean;
+  readonly onClick: () => void;
+}
+
+/** Passes a typed number on, for those without an Enter key at hand. */
+function SetButton({ label, disabled, onClick }: SetButtonProps): JSX.Element {
+  return (
+    <button
+      type="button"
+      class="number-set"
+      aria-label={`Set ${label}`}
+      disabled={disabled}
+      // The field keeps the focus, and with it what is typed.
+      onMouseDown={(event) => event.preventDefault()}
+      onClick={onClick}
+    >
+      Set
+    </button>
   );
 }
 
@@ -147,28 +208,43 @@ export interface DialogProps {
   readonly aside?: ComponentChildren;
   /** Asked before Escape and the cross close the dialog. */
   readonly mayClose?: () => boolean;
+  /** What has the focus at first; without it the title. */
+  readonly first?: RefObject<HTMLElement | null>;
 }
 
-/** A modal dialog; Escape and the cross close it, and the focus goes back to where it was. */
-export function Dialog({ title, onClose, children, wide, aside, mayClose }: DialogProps): JSX.Element {
+/**
+ * A modal dialog; Escape and the cross close it, and the focus goes back to where it was. The browser would focus the
+ * first button, which is the emergency stop in most dialogs: a second Enter would stop the print.
+ */
+export function Dialog({ title, onClose, children, wide, aside, mayClose, first }: DialogProps): JSX.Element {
   const ref = useRef<HTMLDialogElement>(null);
+  const heading = useRef<HTMLHeadingElement>(null);
   const id = useId();
   useEffect(() => {
     const dialog = ref.current;
+    const before = document.activeElement;
     dialog?.showModal();
-    return () => dialog?.close();
-  }, []);
+    (first ?? heading).current?.focus();
+    return () => {
+      dialog?.close();
+      // It is out of the page by now: the browser gives the focus back only from a dialog that is still there.
+      if (before instanceof HTMLElement && document.activeElement === document.body) before.focus();
+    };
+  }, [first]);
   const isFree = (): boolean => mayClose?.() ?? true;
   return (
     <dialog
       ref={ref}
       class={wide ? 'wide' : ''}
       aria-labelledby={id}
-      onClose={onClose}
+      // The browser tells of the end in a later task, when another dialog may be open already: then it is not this one's.
+      onClose={() => ref.current && onClose()}
       onCancel={(event) => !isFree() && event.preventDefault()}
     >
       <header class="dialog-head">
-        <h2 id={id}>{title}</h2>
+        <h2 id={id} ref={heading} tabIndex={-1}>
+          {title}
+        </h2>
         {aside}
         <Button icon="close" label="Close" kind="quiet" onClick={() => isFree() && onClose()} />
       </header>

@@ -2,6 +2,7 @@
 // page, the emergency stop with it.
 import { signal } from '@preact/signals';
 import type { JSX } from 'preact';
+import { useRef } from 'preact/hooks';
 import { PanelDialog } from './emergency';
 import { Button } from './parts';
 
@@ -23,16 +24,17 @@ export function ask(asked: Question): void {
 /** Shows the question that is asked. */
 export function Asked(): JSX.Element | null {
   const asked = question.value;
+  const safe = useRef<HTMLButtonElement>(null);
   if (!asked) return null;
   const close = (): void => {
     if (question.value === asked) question.value = null;
   };
   return (
-    <PanelDialog key={asked.title} title={asked.title} onClose={close}>
+    <PanelDialog key={asked.title} title={asked.title} onClose={close} first={safe}>
       <div class="stack">
         <p>{asked.text}</p>
         <div class="dialog-foot">
-          <Button class="big" onClick={close}>
+          <Button class="big" place={safe} onClick={close}>
             {asked.no}
           </Button>
           <Button

@@ -1,7 +1,7 @@
 // Temperatures, their targets, presets for materials.
 import type { JSX } from 'preact';
 import type { HeaterName, HeaterState } from '../machine/protocol';
-import { isReady, snapshot, wish } from '../state/machine';
+import { isReady, isStale, snapshot, wish } from '../state/machine';
 import { HEATING_BELOW_K } from '../state/print';
 import { type Preset, settings } from '../state/settings';
 import { celsius } from '../units';
@@ -28,7 +28,7 @@ function apply(preset: Preset): void {
 /** What the heater does. Without a board that answers nothing is known but what was read last. */
 function doing(heater: HeaterState | undefined): string {
   if (!heater) return 'Not known';
-  if (!isReady.value) return 'Last reading';
+  if (!isReady.value || isStale.value) return 'Last reading';
   const { temperature, target, duty } = heater;
   if (target === 0) return 'Off';
   const word = target - temperature > HEATING_BELOW_K ? 'Heating' : 'Holding';
@@ -52,7 +52,7 @@ function Heater({ name, heater }: HeaterProps): JSX.Element {
           {doing(heater)}
         </span>
       </div>
-      <div class={`heater-reading ${isHot ? 'hot' : ''} ${isReady.value ? '' : 'old'}`}>
+      <div class={`heater-reading ${isHot ? 'hot' : ''} ${isReady.value && !isStale.value ? '' : 'old'}`}>
         {heater ? formatNumber(heater.temperature, 1) : '–'}
         <span class="unit"> °C</span>
       </div>
@@ -64,6 +64,7 @@ function Heater({ name, heater }: HeaterProps): JSX.Element {
         min={0}
         max={max}
         why={notReady.value}
+        acts
         onSet={(target) => setTarget(name, target)}
       />
       <Button

@@ -1,7 +1,7 @@
 // The bar at the top: what is connected, the dialogs' buttons, and the emergency stop, apart from everything else.
 import { computed, signal } from '@preact/signals';
 import type { JSX } from 'preact';
-import { connection, disconnect, isPrinting, job, port, snapshot } from '../state/machine';
+import { connection, disconnect, isPrinting, isStale, job, port, snapshot } from '../state/machine';
 import { activeProfile } from '../state/profiles';
 import { EmergencyStop } from './emergency';
 import { Button } from './parts';
@@ -25,6 +25,7 @@ const JOBS = {
 
 const status = computed<Status>(() => {
   if (connection.value === 'closed') return { text: 'Not connected', tone: 'off' };
+  if (isStale.value) return { text: 'Not responding', tone: 'bad' };
   const phase = snapshot.value?.phase;
   if (connection.value === 'opening' || phase === undefined) return { text: 'Connecting', tone: 'busy' };
   if (phase === 'ready') return { text: JOBS[job.value], tone: 'good' };

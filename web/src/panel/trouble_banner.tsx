@@ -4,10 +4,43 @@ import { isShutdown, snapshot, trouble, wish } from '../state/machine';
 import { Icon } from './icons';
 import { Button } from './parts';
 
+function Restart(): JSX.Element | null {
+  if (!isShutdown.value) return null;
+  return (
+    <Button kind="primary" onClick={() => void wish({ kind: 'firmware-restart' })}>
+      Restart the board
+    </Button>
+  );
+}
+
+/** The same in a line: of a board that has stopped after its message was put away, and inside dialogs. */
+function Short({ text }: { readonly text: string }): JSX.Element {
+  return (
+    <div class={`trouble short ${isShutdown.value ? 'severe' : ''}`}>
+      <Icon name="warning" />
+      <p class="trouble-text trouble-what">{text}</p>
+      <Restart />
+    </div>
+  );
+}
+
+const STOPPED = 'The board has stopped.';
+
+/** What lies behind a dialog is not read and cannot be reached: the trouble is told in it, too. */
+export function TroubleInDialog(): JSX.Element {
+  const text = trouble.value?.happened ?? (isShutdown.value ? STOPPED : null);
+  return (
+    <div role="alert" class="alert-place">
+      {text !== null && <Short text={text} />}
+    </div>
+  );
+}
+
 export function TroubleBanner(): JSX.Element | null {
   const current = trouble.value;
   return (
     <div role="alert" class="alert-place">
+      {!current && isShutdown.value && <Short text={STOPPED} />}
       {current && (
         <div class={`trouble ${isShutdown.value || snapshot.value?.phase === 'failed' ? 'severe' : ''}`}>
           <Icon name="warning" />
@@ -17,11 +50,7 @@ export function TroubleBanner(): JSX.Element | null {
             <p>{current.todo}</p>
           </div>
           <div class="trouble-actions">
-            {isShutdown.value && (
-              <Button kind="primary" onClick={() => void wish({ kind: 'firmware-restart' })}>
-                Restart the board
-              </Button>
-            )}
+            <Restart />
             <Button
               icon="close"
               kind="quiet"

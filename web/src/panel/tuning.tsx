@@ -1,10 +1,11 @@
 // What may be changed while printing: speed, flow, fan.
 import type { JSX } from 'preact';
-import { snapshot, wish } from '../state/machine';
+import { connection, port, snapshot, wish } from '../state/machine';
 import { share } from '../units';
 import { machineSummary } from './machine_summary';
 import { Card, NumberField } from './parts';
 import { notReady } from './reasons';
+import { VirtualSpeed } from './virtual_speed';
 
 const percent = (value: number | undefined): number => Math.round((value ?? 0) * 100);
 
@@ -24,6 +25,7 @@ export function Tuning(): JSX.Element {
       min={min}
       max={max}
       why={notReady.value}
+      acts
       onSet={(set) => void wish({ kind, value: share(set / 100) })}
     />
   );
@@ -35,6 +37,9 @@ export function Tuning(): JSX.Element {
         {machineSummary.value?.hasFan !== false && field('Part fan', 'fan', percent(now?.fan), 0, 100)}
       </div>
       {notReady.value && <p class="hint">{notReady.value}</p>}
+      {connection.value === 'open' && port.value?.kind === 'virtual' && (
+        <VirtualSpeed label="Virtual printer" />
+      )}
     </Card>
   );
 }

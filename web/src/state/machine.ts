@@ -3,6 +3,7 @@
 import { computed, signal } from '@preact/signals';
 import type { VirtualState } from '../bindings/VirtualState';
 import type {
+  ConfirmedLines,
   FromMachine,
   MachineEvent,
   PortChoice,
@@ -11,7 +12,7 @@ import type {
   Trouble,
   Wish,
 } from '../machine/protocol';
-import { portTrouble, workerDied } from '../machine/troubles';
+import { plannerMissing, portTrouble, stopNotSent, workerDied } from '../machine/troubles';
 import { note } from './log';
 
 export type ConnectionState = 'closed' | 'opening' | 'open';
@@ -29,6 +30,8 @@ export const plannedSpeed = signal(new Float64Array());
 export const firmware = signal<{ readonly version: string; readonly mcu: string } | null>(null);
 /** What the user has to be told, until it is put away or overtaken. */
 export const trouble = signal<Trouble | null>(null);
+/** No news came for a while: what is known is old, and may not hold any more. */
+export const isStale = signal(false);
 /** How the last print ended. */
 export const outcome = signal<'done' | 'cancelled' | 'stopped' | null>(null);
 
@@ -39,15 +42,61 @@ export const isPrinting = computed(() => job.value !== 'none');
 /** Whether the head may be moved by hand. */
 export const mayMove = computed(() => isReady.value && (job.value === 'none' || job.value === 'paused'));
 
+/** News come ten times a second; after so long without any they are old, in ms. */
+const STALE_MS = 2000;
+/** An emergency stop that is not answered by then is taken for lost, in ms. */
+const STOP_ANSWER_MS = 1000;
+/** A worker that stops this often without a connection in between is not started again. */
+const DEATHS_MAX = 3;
+
+/** What came of a wish: null where it is being done, 'gone' where the worker went without an answer. */
+type Answer = Trouble | null | 'gone';
+
 let worker: Worker | undefined;
+let deaths = 0;
 let lastId = 0;
-const waiting = new Map<number, (trouble: Trouble | null) => void>();
+/** A print was begun since the last snapshot. */
+let isBegun = false;
+let newsTimer: ReturnType<typeof setTimeout> | undefined;
+const waiting = new Map<number, (answer: Answer) => void>();
 
 /** Starts the worker, which loads the planner. */
 export function startMachine(): void {
-  worker = new Worker(new URL('../machine/worker.ts', import.meta.url), { type: 'module', name: 'machine' });
-  worker.onmessage = ({ data }: MessageEvent<FromMachine>) => take(data);
-  worker.onerror = (event) => closed(workerDied(event.message));
+  const started = new Worker(new URL('../machine/worker.ts', import.meta.url), {
+    type: 'module',
+    name: 'machine',
+  });
+  // What an ended worker sent before it ended may still arrive.
+  started.onmessage = ({ data }: MessageEvent<FromMachine>) => {
+    if (worker === started) take(data);
+  };
+  started.onerror = (event) => {
+    event.preventDefault();
+    // Where its script cannot be loaded, there is no message.
+    if (worker === started) died(event.message || 'its script could not be loaded');
+  };
+  worker = started;
+}
+
+/** The worker is of no use any more. Ending it closes its port and lets go of its lock. */
+function died(message: string): void {
+  worker?.terminate();
+  worker = undefined;
+  deaths += 1;
+  if (!plannerLoaded.value || deaths > DEATHS_MAX) return closed(plannerMissing(message));
+  const kind = connection.value === 'closed' ? null : (port.value?.kind ?? null);
+  plannerLoaded.value = false;
+  closed(workerDied(message, kind));
+  startMachine();
+}
+
+function news(): void {
+  clearTimeout(newsTimer);
+  isStale.value = false;
+  if (connection.value !== 'open') return;
+  newsTimer = setTimeout(() => {
+    isStale.value = true;
+  }, STALE_MS);
 }
 
 const send = (message: ToMachine): void => worker?.postMessage(message);
@@ -60,7 +109,8 @@ function closed(reason: Trouble | null): void {
   snapshot.value = null;
   plannedSpeed.value = new Float64Array();
   firmware.value = null;
-  for (const settle of waiting.values()) settle(null);
+  news();
+  for (const settle of waiting.values()) settle('gone');
   waiting.clear();
   if (reason) report(reason);
   if (reason?.code === 'planner-missing') plannerFailed.value = true;
@@ -79,6 +129,8 @@ function take(message: FromMachine): void {
       break;
     case 'opened':
       connection.value = 'open';
+      deaths = 0;
+      news();
       trouble.value = null;
       outcome.value = null;
       note('info', 'Port open; asking the board who it is.');
@@ -86,8 +138,12 @@ function take(message: FromMachine): void {
     case 'closed':
       closed(message.trouble);
       break;
+    case 'died':
+      died(message.message);
+      break;
     case 'snapshot':
-      if (connection.value === 'open') snapshot.value = message.snapshot;
+      if (connection.value === 'open') look(message.snapshot);
+      send({ kind: 'seen' });
       break;
     case 'planned-speed':
       if (connection.value === 'open') plannedSpeed.value = message.pairs;
@@ -107,6 +163,15 @@ function take(message: FromMachine): void {
       note('warning', `The computer was held up for ${message.seconds.toFixed(1)} s.`);
       break;
   }
+}
+
+function look(now: Snapshot): void {
+  const wasPrinting = isPrinting.value;
+  snapshot.value = now;
+  news();
+  // It ended without a word of how: in an error.
+  if ((wasPrinting || isBegun) && !isPrinting.value) outcome.value ??= 'stopped';
+  isBegun = false;
 }
 
 const PHASES: Record<Snapshot['phase'], string> = {
@@ -178,12 +243,16 @@ export function connect(choice: PortChoice, config: string): void {
 /** Whether `plannedSpeed` is wanted. */
 export const watchSpeed = (on: boolean): void => send({ kind: 'watch-speed', on });
 
-export const disconnect = (): void => send({ kind: 'disconnect' });
+/** A worker that says nothing any more is ended instead. */
+export function disconnect(): void {
+  if (isStale.value) died('it did not answer');
+  else send({ kind: 'disconnect' });
+}
 
 /** A port that could not even be chosen. */
 export const refusePort = (error: unknown): void => report(portTrouble(error));
 
-function ask(make: (id: number) => ToMachine): Promise<Trouble | null> {
+function ask(make: (id: number) => ToMachine): Promise<Answer> {
   lastId += 1;
   const id = lastId;
   return new Promise((resolve) => {
@@ -192,18 +261,21 @@ function ask(make: (id: number) => ToMachine): Promise<Trouble | null> {
   });
 }
 
-/** Asks for something; a refusal is shown. True where it is being done. */
-export async function wish(wanted: Wish): Promise<boolean> {
-  const refusal = await ask((id) => ({ kind: 'wish', id, wish: wanted }));
-  if (refusal) report(refusal);
-  return refusal === null;
+/** Shows a refusal. True where what was asked for is being done. */
+function isDone(answer: Answer): boolean {
+  if (answer !== null && answer !== 'gone') report(answer);
+  return answer === null;
 }
 
-export async function print(file: Blob, confirmedLines: readonly number[]): Promise<boolean> {
+/** Asks for something; a refusal is shown. True where it is being done. */
+export async function wish(wanted: Wish): Promise<boolean> {
+  return isDone(await ask((id) => ({ kind: 'wish', id, wish: wanted })));
+}
+
+export async function print(file: Blob, confirmedLines: ConfirmedLines): Promise<boolean> {
   outcome.value = null;
-  const refusal = await ask((id) => ({ kind: 'print', id, file, confirmedLines }));
-  if (refusal) report(refusal);
-  return refusal === null;
+  isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, confirmedLines })));
+  return isBegun;
 }
 
 export async function gcode(text: string): Promise<boolean> {
@@ -217,8 +289,12 @@ export function setVirtualSpeed(speed: number): void {
   send({ kind: 'speed', speed });
 }
 
-/** At once, whatever else is going on. */
-export function emergencyStop(): void {
-  send({ kind: 'wish', id: 0, wish: { kind: 'emergency-stop' } });
+/** At once, whatever else is going on. A stop that cannot be sent is shown, and so is one that is not answered. */
+export async function emergencyStop(): Promise<void> {
   note('error', 'Emergency stop pressed.');
+  const late = setTimeout(() => report(stopNotSent('no-answer')), STOP_ANSWER_MS);
+  const answer = await ask((id) => ({ kind: 'wish', id, wish: { kind: 'emergency-stop' } }));
+  clearTimeout(late);
+  if (answer === null) return;
+  report(answer === 'gone' ? stopNotSent('no-answer') : answer);
 }

@@ -1,9 +1,10 @@
 // The file that is shown and may be printed: its reading, what was found in it, what the user has confirmed.
 // The other end is the preview worker, which never disturbs a running print.
-import { computed, effect, signal } from '@preact/signals';
+import { effect, signal } from '@preact/signals';
 import type { Trouble } from '../machine/protocol';
-import { workerDied } from '../machine/troubles';
+import { previewDied } from '../machine/troubles';
 import type { ConfigReport, FromPreview, Summary, ToPreview, VertexHeader } from '../preview/protocol';
+import { note } from './log';
 import { LineMarks } from './marks';
 import { activeProfile } from './profiles';
 
@@ -26,26 +27,72 @@ export const reading = signal<number | null>(null);
 export const summary = signal<Summary | null>(null);
 export const failure = signal<Trouble | null>(null);
 export const confirmed = signal<ReadonlySet<number>>(new Set());
-export const previewLoaded = signal(false);
 
-export const unconfirmed = computed(() =>
-  (summary.value?.blocking ?? []).filter((remark) => !confirmed.value.has(remark.line)),
-);
+/** A worker that stops this often without having read anything in between is not started again. */
+const DEATHS_MAX = 3;
 
 let worker: Worker | undefined;
+let deaths = 0;
+let lastDeath: Trouble | undefined;
 let job = 0;
 let sink: GeometrySink | undefined;
 let configId = 0;
 let marks = new LineMarks();
-const configs = new Map<number, (report: ConfigReport) => void>();
+interface WaitingCheck {
+  readonly text: string;
+  readonly settle: (report: ConfigReport) => void;
+  /** A worker stopped before it was done. */
+  isRepeated: boolean;
+}
+const configs = new Map<number, WaitingCheck>();
+
+function startWorker(): void {
+  const started = new Worker(new URL('../preview/worker.ts', import.meta.url), {
+    type: 'module',
+    name: 'preview',
+  });
+  started.onmessage = ({ data }: MessageEvent<FromPreview>) => {
+    if (worker === started) take(data);
+  };
+  started.onerror = (event) => {
+    event.preventDefault();
+    // Where its script cannot be loaded, there is no message.
+    if (worker === started) died(event.message || 'its script could not be loaded');
+  };
+  worker = started;
+}
+
+/** What was being read is given up, what was being checked cannot be said. */
+function died(message: string): void {
+  worker?.terminate();
+  worker = undefined;
+  deaths += 1;
+  lastDeath = previewDied(message);
+  note('error', lastDeath.happened);
+  // What was read before holds on.
+  if (reading.value !== null) {
+    reading.value = null;
+    failure.value = lastDeath;
+  }
+  if (deaths <= DEATHS_MAX) startWorker();
+  for (const [id, check] of configs) {
+    if (check.isRepeated || !worker) {
+      configs.delete(id);
+      check.settle(unchecked());
+    } else {
+      check.isRepeated = true;
+      send({ kind: 'check-config', id, text: check.text });
+    }
+  }
+}
+
+const unchecked = (): ConfigReport => ({
+  remarks: [{ line: 0, severity: 'error', text: lastDeath?.happened ?? '' }],
+  machine: null,
+});
 
 export function startPreview(): void {
-  worker = new Worker(new URL('../preview/worker.ts', import.meta.url), { type: 'module', name: 'preview' });
-  worker.onmessage = ({ data }: MessageEvent<FromPreview>) => take(data);
-  worker.onerror = (event) => {
-    reading.value = null;
-    failure.value = workerDied(event.message);
-  };
+  startWorker();
   let config: string | undefined;
   // Another machine: what was found in the file holds no longer.
   effect(() => {
@@ -74,6 +121,11 @@ function read(config: string): void {
   confirmed.value = new Set();
   marks = new LineMarks();
   sink?.clear();
+  if (!worker && lastDeath) {
+    reading.value = null;
+    failure.value = lastDeath;
+    return;
+  }
   send({ kind: 'open', job, file: open.blob, name: open.name, config });
 }
 
@@ -92,30 +144,21 @@ export function closeFile(): void {
   sink?.clear();
 }
 
-export function confirmLine(line: number, yes: boolean): void {
-  const lines = new Set(confirmed.value);
-  if (yes) lines.add(line);
-  else lines.delete(line);
-  confirmed.value = lines;
-}
-
 /** Reads a printer.cfg and says what is wrong with it, by line. */
 export function checkConfig(text: string): Promise<ConfigReport> {
   configId += 1;
   const id = configId;
   return new Promise((resolve) => {
-    configs.set(id, resolve);
+    if (!worker && lastDeath) return resolve(unchecked());
+    configs.set(id, { text, settle: resolve, isRepeated: false });
     send({ kind: 'check-config', id, text });
   });
 }
 
 function take(message: FromPreview): void {
-  if (message.kind === 'loaded') {
-    previewLoaded.value = true;
-    return;
-  }
+  if (message.kind === 'loaded') return;
   if (message.kind === 'config') {
-    configs.get(message.id)?.(message.report);
+    configs.get(message.id)?.settle(message.report);
     configs.delete(message.id);
     return;
   }
@@ -135,6 +178,7 @@ function take(message: FromPreview): void {
       reading.value = Math.min(1, message.bytes / Math.max(1, file.value?.blob.size ?? 1));
       break;
     case 'summary':
+      deaths = 0;
       reading.value = null;
       summary.value = message.summary;
       sink?.finish(message.summary);

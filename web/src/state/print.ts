@@ -3,9 +3,10 @@
 import { computed, effect, signal } from '@preact/signals';
 import type { Snapshot } from '../machine/protocol';
 import type { Layer, Summary } from '../preview/protocol';
+import { consent } from './confirm';
 import { isPrinting, outcome, port, print, snapshot } from './machine';
 import type { LineMarks } from './marks';
-import { confirmed, file, lineMarks, type OpenFile, summary } from './preview';
+import { file, lineMarks, type OpenFile, summary } from './preview';
 
 /** A file as it was when its print was started. */
 export interface PrintedFile {
@@ -46,7 +47,7 @@ export async function printShown(): Promise<void> {
   if (!open || !found) return;
   const before = printed.value;
   printed.value = { file: open, summary: found, marks: lineMarks() };
-  if (!(await print(open.blob, [...confirmed.value]))) printed.value = before;
+  if (!(await print(open.blob, consent.value))) printed.value = before;
 }
 
 /** The layer in which a vertex lies, counted from 1; 0 before the first. */

@@ -244,6 +244,11 @@ impl Session {
                     now
                 }
             },
+            // Whether a board that was told to stop has done so is not known until it answers.
+            Stage::Shutdown(board) if board.sync.is_silent(now) => {
+                self.fail(PrinterError::new(ErrorCode::LinkTimeout, "it was stopped, and answers no more"));
+                now + IDLE_WAKE
+            }
             Stage::Shutdown(board) => {
                 connect::ask_clock(board, now);
                 let clock_now = board.clock_at(now);

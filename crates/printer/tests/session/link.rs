@@ -145,6 +145,17 @@ fn a_board_that_is_in_shutdown_says_why() {
 }
 
 #[test]
+fn a_stop_that_nobody_answers_is_not_claimed() {
+    let mut bench = Setup::faults("unplug@60").ready();
+    bench.run(60.0 - bench.age());
+    bench.ask(Request::EmergencyStop);
+    bench.events.clear();
+    bench.until("the silence", 10.0, |bench| bench.session.phase() == PhaseName::Failed);
+    bench.failed(ErrorCode::LinkTimeout, None);
+    assert!(bench.error().what_to_do().contains("cut its power"));
+}
+
+#[test]
 fn a_port_with_nobody_there() {
     let mut bench = Setup::faults("unplug").bench();
     bench.until("the end", 10.0, |bench| bench.session.phase() == PhaseName::Failed);
