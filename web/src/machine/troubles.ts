@@ -132,7 +132,7 @@ export const stopNotSent = (reason: keyof typeof STOP_REASONS): Trouble =>
     `No emergency stop could be sent: ${STOP_REASONS[reason]}.`,
     reason === 'identifying'
       ? 'The stop is sent as soon as the board has said it. Until then nothing is known of what the printer does.'
-      : 'Nothing is known of what the printer does. A board without orders switches its heaters off within 3 seconds and stops when its queue of moves is empty.',
+      : 'Nothing is known of what the printer does. A board without orders switches its heaters off within 5 seconds and stops when its queue of moves is empty.',
     'If the printer moves or heats, cut its power now.',
   );
 
