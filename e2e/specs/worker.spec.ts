@@ -95,7 +95,8 @@ test('a worker that hangs: what is shown is marked as old, and disconnecting end
 
 test('an emergency stop before the board is known is sent as soon as it is', async ({ bridge, open }) => {
   const printer = new PrinterDevice();
-  const port = bridge.add(printer, FAST);
+  // The session gives a silent board up after seconds of this time: slow enough for the stop to be pressed before.
+  const port = bridge.add(printer, { ...FAST, speed: 0.25 });
   const panel = await open();
   port.isMute = true;
   await panel.pickAndConnect(bridge, port);
