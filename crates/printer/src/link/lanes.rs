@@ -152,7 +152,7 @@ impl Lanes {
 
     /// The earliest clock at which motion that waits is due.
     pub(super) fn motion_due(&self) -> Option<Ticks> {
-        self.motion_fronts().map(|(_, front)| front.req_clock).min()
+        self.motion_fronts().filter(|(_, front)| front.covers).map(|(_, front)| front.req_clock).min()
     }
 
     fn motion_fronts(&self) -> impl Iterator<Item = (usize, &Outgoing)> {
@@ -188,8 +188,10 @@ impl Lanes {
                 break;
             }
             draft.motion_taken[lane] += 1;
-            let due = draft.motion.due.map_or(message.req_clock, |due| due.min(message.req_clock));
-            draft.motion.due = Some(due);
+            if message.covers {
+                let due = draft.motion.due.map_or(message.req_clock, |due| due.min(message.req_clock));
+                draft.motion.due = Some(due);
+            }
             if let Some(end) = message.entry_until {
                 draft.motion.ends[lane] = draft.motion.ends[lane].max(end);
             }

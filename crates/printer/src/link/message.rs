@@ -37,6 +37,8 @@ pub struct Outgoing {
     pub(super) min_clock: Ticks,
     /// The entry of the move queue that it takes comes free at this clock.
     pub(super) entry_until: Option<Ticks>,
+    /// Motion lasts until the board has it; otherwise it only goes along.
+    pub(super) covers: bool,
 }
 
 impl Outgoing {
@@ -63,7 +65,15 @@ impl Outgoing {
     }
 
     const fn new(lane: Lane, bytes: [u8; PAYLOAD_BYTES_MAX], len: usize) -> Self {
-        Self { bytes, len: len as u8, lane, req_clock: Ticks(0), min_clock: Ticks(0), entry_until: None }
+        Self {
+            bytes,
+            len: len as u8,
+            lane,
+            req_clock: Ticks(0),
+            min_clock: Ticks(0),
+            entry_until: None,
+            covers: true,
+        }
     }
 
     /// It belongs to something that happens at `clock`: the board must have it before, and gets it no earlier than
@@ -73,6 +83,13 @@ impl Outgoing {
     pub fn due(mut self, clock: Ticks) -> Self {
         self.req_clock = clock;
         self.min_clock = clock.saturating_sub(SCHEDULE_AHEAD_TICKS_MAX);
+        self
+    }
+
+    /// It goes along with the motion without being any: how far the board has motion does not depend on it.
+    #[must_use]
+    pub fn beside(mut self) -> Self {
+        self.covers = false;
         self
     }
 

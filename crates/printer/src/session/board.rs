@@ -129,7 +129,9 @@ impl Board {
     /// Sets an output at a motion clock: in its place among the steps, where the board ties it to them.
     pub(super) fn fan_at(&mut self, command: &Command<'_>, clock: Ticks) {
         if self.layout.has_motion_clock {
-            self.motion(FAN_LANE, command, clock, Some(clock));
+            self.send(Lane::Motion(FAN_LANE as u8), command, |message| {
+                message.due(clock).entry_until(clock).beside()
+            });
         } else {
             self.control_at(command, clock);
         }
