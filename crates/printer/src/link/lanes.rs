@@ -150,8 +150,8 @@ impl Lanes {
         self.control.clear();
     }
 
-    /// The earliest clock at which motion that waits is due.
-    pub(super) fn motion_due(&self) -> Option<Ticks> {
+    /// The clock before which no motion waits; what only goes along with it does not count.
+    pub(super) fn uncovered(&self) -> Option<Ticks> {
         self.motion_fronts().filter(|(_, front)| front.covers).map(|(_, front)| front.req_clock).min()
     }
 
@@ -188,9 +188,11 @@ impl Lanes {
                 break;
             }
             draft.motion_taken[lane] += 1;
+            let earlier =
+                |of: Option<Ticks>| Some(of.map_or(message.req_clock, |of| of.min(message.req_clock)));
+            draft.motion.due = earlier(draft.motion.due);
             if message.covers {
-                let due = draft.motion.due.map_or(message.req_clock, |due| due.min(message.req_clock));
-                draft.motion.due = Some(due);
+                draft.motion.uncovered = earlier(draft.motion.uncovered);
             }
             if let Some(end) = message.entry_until {
                 draft.motion.ends[lane] = draft.motion.ends[lane].max(end);

@@ -207,7 +207,7 @@ impl Link {
     /// The clock before which all motion that was queued here has been acknowledged by the board: the earliest at
     /// which anything is due that waits or is on the way. `None` when there is nothing left to acknowledge.
     pub fn motion_covered(&self) -> Option<Ticks> {
-        self.window.motion_due().into_iter().chain(self.lanes.motion_due()).min()
+        self.window.uncovered().into_iter().chain(self.lanes.uncovered()).min()
     }
 
     /// The clock of the last step of a motion lane that the board has acknowledged; zero before the first.

@@ -30,14 +30,16 @@ const SEQUENCES: u64 = SEQUENCE_MASK as u64 + 1;
 /// The motion in a block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MotionClocks {
-    /// The earliest clock at which any of it is due; `None` where there is none.
+    /// The earliest clock at which any of it is due, which says when to send it; `None` where there is none.
     pub(super) due: Option<Ticks>,
+    /// The same without what only goes along with the motion: until the board has it, motion lasts so long.
+    pub(super) uncovered: Option<Ticks>,
     /// For each lane, the clock of the last step.
     pub(super) ends: [Ticks; MOTION_LANES_MAX],
 }
 
 impl MotionClocks {
-    pub(super) const NONE: Self = Self { due: None, ends: [Ticks(0); MOTION_LANES_MAX] };
+    pub(super) const NONE: Self = Self { due: None, uncovered: None, ends: [Ticks(0); MOTION_LANES_MAX] };
 }
 
 /// A block that has been sent.
@@ -158,9 +160,9 @@ impl Window {
         &self.motion_ends
     }
 
-    /// The earliest clock at which motion is due that is on the way.
-    pub(super) fn motion_due(&self) -> Option<Ticks> {
-        self.sent.iter().filter_map(|sent| sent.motion.due).min()
+    /// The clock before which no motion is on the way; what only goes along with it does not count.
+    pub(super) fn uncovered(&self) -> Option<Ticks> {
+        self.sent.iter().filter_map(|sent| sent.motion.uncovered).min()
     }
 
     /// Asks the board for its number with an empty block, which tells it by an answer whether it is taken or refused.
