@@ -15,12 +15,14 @@ import { startPreview } from './state/preview';
 import { followPrint } from './state/print';
 import { loadProfiles } from './state/profiles';
 import { applySettings } from './state/settings';
+import { startWatching } from './state/watched';
 
 applySettings();
 const root = document.getElementById('app');
 if (root) render(<App />, root);
 startMachine();
 startPreview();
+startWatching();
 followTemperatures();
 guardPrint();
 followPrint();

@@ -4,7 +4,7 @@
 // clocks nor ports.
 import { type Seconds, seconds } from '../units';
 import { Feeder } from './feeder';
-import type { ConfirmedLines, FromMachine, MachineEvent, Trouble, WakeUps, Wish } from './protocol';
+import type { ConfirmedLines, FromMachine, MachineEvent, Snapshot, Trouble, WakeUps, Wish } from './protocol';
 import type { Session } from './session';
 import { fileBrokeOff, fileUnreadable, stopNotSent } from './troubles';
 
@@ -112,13 +112,19 @@ export class Machine {
     this.#dropped = 0;
     if (this.#events.length > 0) this.#tell({ kind: 'events', events: this.#events });
     this.#events = [];
-    const snapshot = this.session.snapshot(now);
+    const snapshot = this.look(now);
     // A job that ended in an error has no event of its own.
     if (snapshot.job === 'none') this.dropJob();
-    const link = snapshot.link && { ...snapshot.link, lineErrors: this.#lineErrors() };
-    this.#tell({ kind: 'snapshot', snapshot: { ...snapshot, link, wakeUps: this.#wakeUps } });
+    this.#tell({ kind: 'snapshot', snapshot });
     if (!this.watchesSpeed) return;
     this.#tell({ kind: 'planned-speed', pairs: this.session.plannedSpeed(now, SPEED_BEHIND, SPEED_AHEAD) });
+  }
+
+  /** How things are. */
+  look(now: Seconds): Snapshot {
+    const snapshot = this.session.snapshot(now);
+    const link = snapshot.link && { ...snapshot.link, lineErrors: this.#lineErrors() };
+    return { ...snapshot, link, wakeUps: this.#wakeUps };
   }
 
   wish(wish: Wish, now: Seconds): Trouble | null {

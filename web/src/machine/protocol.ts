@@ -107,11 +107,27 @@ export type PortChoice =
       readonly faults: string;
     };
 
+/** What there is to say of a print's file. */
+export interface PrintFacts {
+  readonly name: string;
+  /** From the plan; null where that is not known. */
+  readonly time: Seconds | null;
+  readonly lines: number;
+}
+
 /** Lines that the user wants left out; all that are not known, where there are more than can be listed. */
 export type ConfirmedLines = readonly number[] | 'all';
 
 export type ToMachine =
-  | { readonly kind: 'connect'; readonly port: PortChoice; readonly config: string }
+  | {
+      readonly kind: 'connect';
+      readonly port: PortChoice;
+      readonly config: string;
+      /** Of this one connection, among all tabs. */
+      readonly id: string;
+      /** What the user calls the machine. */
+      readonly name: string;
+    }
   | { readonly kind: 'disconnect' }
   | { readonly kind: 'wish'; readonly id: number; readonly wish: Wish }
   | {
@@ -119,6 +135,7 @@ export type ToMachine =
       readonly id: number;
       readonly file: Blob;
       readonly confirmedLines: ConfirmedLines;
+      readonly facts: PrintFacts;
     }
   | { readonly kind: 'speed'; readonly speed: number }
   /** A snapshot has arrived: the next may be sent. */

@@ -1,14 +1,29 @@
 // What went wrong, in three parts, with the action that comes next.
 import type { JSX } from 'preact';
-import { isShutdown, snapshot, trouble, wish } from '../state/machine';
+import type { Trouble } from '../machine/protocol';
+import { connection, isShutdown, snapshot, trouble, wish } from '../state/machine';
+import { openDialog } from './dialogs';
 import { Icon } from './icons';
 import { Button } from './parts';
+
+/** Troubles after which connecting from this tab is the way on. */
+const CONNECTABLE = new Set(['driver-gone']);
 
 function Restart(): JSX.Element | null {
   if (!isShutdown.value) return null;
   return (
     <Button kind="primary" onClick={() => void wish({ kind: 'firmware-restart' })}>
       Restart the board
+    </Button>
+  );
+}
+
+/** What may be done about it here and now; nothing of it happens by itself. */
+function WayOn({ of: { code } }: { readonly of: Trouble }): JSX.Element | null {
+  if (connection.value !== 'closed' || !CONNECTABLE.has(code)) return null;
+  return (
+    <Button kind="primary" onClick={() => (openDialog.value = 'connect')}>
+      Connect here
     </Button>
   );
 }
@@ -51,6 +66,7 @@ export function TroubleBanner(): JSX.Element | null {
           </div>
           <div class="trouble-actions">
             <Restart />
+            <WayOn of={current} />
             <Button
               icon="close"
               kind="quiet"

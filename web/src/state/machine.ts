@@ -7,6 +7,7 @@ import type {
   FromMachine,
   MachineEvent,
   PortChoice,
+  PrintFacts,
   Snapshot,
   ToMachine,
   Trouble,
@@ -14,6 +15,7 @@ import type {
 } from '../machine/protocol';
 import { plannerMissing, portTrouble, stopNotSent, workerDied } from '../machine/troubles';
 import { note } from './log';
+import type { Profile } from './profiles';
 
 export type ConnectionState = 'closed' | 'opening' | 'open';
 
@@ -117,7 +119,8 @@ function closed(reason: Trouble | null): void {
   if (wasOpen) note('info', 'Disconnected.');
 }
 
-function report(reason: Trouble): void {
+/** Tells the user. */
+export function report(reason: Trouble): void {
   trouble.value = reason;
   note('error', reason.happened);
 }
@@ -231,13 +234,18 @@ function happened(event: MachineEvent): void {
   }
 }
 
-export function connect(choice: PortChoice, config: string): void {
+/** Of this tab's connection, the present or the last one. */
+export const connectionId = signal('');
+
+/** `name` is what the user calls the machine, `config` its file. */
+export function connect(choice: PortChoice, { name, config }: Pick<Profile, 'name' | 'config'>): void {
   if (connection.value !== 'closed') return;
   connection.value = 'opening';
+  connectionId.value = crypto.randomUUID();
   port.value = choice;
   virtualRecord.value = null;
   trouble.value = null;
-  send({ kind: 'connect', port: choice, config });
+  send({ kind: 'connect', port: choice, config, id: connectionId.value, name });
 }
 
 /** Whether `plannedSpeed` is wanted. */
@@ -272,9 +280,9 @@ export async function wish(wanted: Wish): Promise<boolean> {
   return isDone(await ask((id) => ({ kind: 'wish', id, wish: wanted })));
 }
 
-export async function print(file: Blob, confirmedLines: ConfirmedLines): Promise<boolean> {
+export async function print(file: Blob, facts: PrintFacts, confirmedLines: ConfirmedLines): Promise<boolean> {
   outcome.value = null;
-  isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, confirmedLines })));
+  isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, facts, confirmedLines })));
   return isBegun;
 }
 
