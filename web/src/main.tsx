@@ -14,6 +14,7 @@ import { startMachine } from './state/machine';
 import { startPreview } from './state/preview';
 import { followPrint } from './state/print';
 import { loadProfiles } from './state/profiles';
+import { followPort } from './state/reconnect';
 import { applySettings } from './state/settings';
 import { startWatching } from './state/watched';
 
@@ -25,5 +26,6 @@ startPreview();
 startWatching();
 followTemperatures();
 guardPrint();
+followPort();
 followPrint();
 void loadProfiles().then(followProfile);

@@ -2,6 +2,7 @@
 //
 // The loops (realtime.ts, lockstep.ts) give it bytes and time; it gives them bytes and the next wake-up. Knows neither
 // clocks nor ports.
+import type { LineErrors } from '../transport/transport';
 import { type Seconds, seconds } from '../units';
 import { Feeder } from './feeder';
 import type { ConfirmedLines, FromMachine, MachineEvent, Snapshot, Trouble, WakeUps, Wish } from './protocol';
@@ -20,7 +21,7 @@ const SPEED_AHEAD = seconds(5);
 export class Machine {
   readonly session: Session;
   readonly #tell: (message: FromMachine) => void;
-  readonly #lineErrors: () => number;
+  readonly #lineErrors: () => LineErrors;
   #feeder: Feeder | undefined;
   #starting = false;
   /** The file of the job that waits broke off: it cannot go on. */
@@ -34,7 +35,7 @@ export class Machine {
   /** Whether the planned speed is told. */
   watchesSpeed = false;
 
-  constructor(session: Session, tell: (message: FromMachine) => void, lineErrors: () => number) {
+  constructor(session: Session, tell: (message: FromMachine) => void, lineErrors: () => LineErrors) {
     this.session = session;
     this.#tell = tell;
     this.#lineErrors = lineErrors;
@@ -53,7 +54,7 @@ export class Machine {
     return bytes;
   }
 
-  /** A timer came this much later than it was asked for. */
+  /** It is this much later than it should be: the computer slept, or was very busy. */
   woke(late: Seconds): void {
     const { missed, latest } = this.#wakeUps;
     const isMissed = late > MISSED_MIN;

@@ -2,6 +2,7 @@
 // Shapes only. Values that come from the planner are described here in the page's own words; machine/planner.ts
 // makes them from the planner's.
 import type { VirtualState } from '../bindings/VirtualState';
+import type { LineErrors } from '../transport/transport';
 import type { PortId } from '../transport/web_serial';
 import type { Celsius, Mm, Seconds, Share } from '../units';
 
@@ -43,7 +44,7 @@ export interface LinkCounts {
   readonly bytesRetransmitted: number;
   readonly timeouts: number;
   readonly roundTrip: Seconds | null;
-  readonly lineErrors: number;
+  readonly lineErrors: LineErrors;
 }
 
 /** How late the worker's timers were since the connection began. */

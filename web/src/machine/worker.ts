@@ -3,7 +3,7 @@
 // Nothing here waits for the page. A Web Lock is held from before the port is opened to after it is closed, so that
 // one tab has a printer; a tab that holds a lock is not frozen either.
 import { ANSWER_BYTES_MAX, classify } from '../transport/answer';
-import { PortError } from '../transport/transport';
+import { NO_LINE_ERRORS, PortError } from '../transport/transport';
 import { find, openSerial } from '../transport/web_serial';
 import { type Seconds, seconds } from '../units';
 import { Broadcast } from './broadcast';
@@ -158,7 +158,7 @@ async function connectVirtual(
     const printer = loaded.powerUp(config, choice.board, choice.seed, choice.faults);
     const now = (): Seconds => printer.now();
     const session = loaded.openVirtualSession(config, choice.board, now());
-    const machine = new Machine(session, tell, () => 0);
+    const machine = new Machine(session, tell, () => NO_LINE_ERRORS);
     const loop = new LockstepLoop(machine, printer, choice.speed, realNow);
     return await hold(message, {
       machine,

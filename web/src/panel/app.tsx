@@ -11,6 +11,7 @@ import { Instruments } from './instruments';
 import { Job } from './job';
 import { MachineDialog } from './machine_dialog';
 import { Motion } from './motion';
+import { Notices } from './notices';
 import { dropped } from './open_file';
 import { Asked } from './question';
 import { SettingsDialog } from './settings_dialog';
@@ -58,6 +59,7 @@ export function App(): JSX.Element {
       <div class="page-head">
         <TopBar />
         <TroubleBanner />
+        <Notices />
       </div>
       <main class="layout">
         <div class="stage">

@@ -2,6 +2,7 @@
 import type { JSX } from 'preact';
 import type { Trouble } from '../machine/protocol';
 import { connection, isShutdown, snapshot, trouble, wish } from '../state/machine';
+import { mayReconnect, reconnect } from '../state/reconnect';
 import { openDialog } from './dialogs';
 import { Icon } from './icons';
 import { Button } from './parts';
@@ -20,6 +21,12 @@ function Restart(): JSX.Element | null {
 
 /** What may be done about it here and now; nothing of it happens by itself. */
 function WayOn({ of: { code } }: { readonly of: Trouble }): JSX.Element | null {
+  if (mayReconnect.value)
+    return (
+      <Button kind="primary" onClick={reconnect}>
+        Reconnect
+      </Button>
+    );
   if (connection.value !== 'closed' || !CONNECTABLE.has(code)) return null;
   return (
     <Button kind="primary" onClick={() => (openDialog.value = 'connect')}>
@@ -63,6 +70,7 @@ export function TroubleBanner(): JSX.Element | null {
             <p class="trouble-what">{current.happened}</p>
             <p>{current.safe}</p>
             <p>{current.todo}</p>
+            {mayReconnect.value && <p>The device is there again.</p>}
           </div>
           <div class="trouble-actions">
             <Restart />

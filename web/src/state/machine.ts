@@ -14,6 +14,8 @@ import type {
   Wish,
 } from '../machine/protocol';
 import { plannerMissing, portTrouble, stopNotSent, workerDied } from '../machine/troubles';
+import { stalled } from './incidents';
+import { forgetLineErrors, noteLineErrors } from './line_errors';
 import { note } from './log';
 import type { Profile } from './profiles';
 
@@ -59,6 +61,8 @@ let deaths = 0;
 let lastId = 0;
 /** A print was begun since the last snapshot. */
 let isBegun = false;
+/** Why motion was held last. */
+let heldFor: Trouble | null = null;
 let newsTimer: ReturnType<typeof setTimeout> | undefined;
 const waiting = new Map<number, (answer: Answer) => void>();
 
@@ -132,6 +136,7 @@ function take(message: FromMachine): void {
       break;
     case 'opened':
       connection.value = 'open';
+      forgetLineErrors();
       deaths = 0;
       news();
       trouble.value = null;
@@ -163,12 +168,13 @@ function take(message: FromMachine): void {
       break;
     }
     case 'gap':
-      note('warning', `The computer was held up for ${message.seconds.toFixed(1)} s.`);
+      stalled(message.seconds, isPrinting.value);
       break;
   }
 }
 
 function look(now: Snapshot): void {
+  if (now.link) noteLineErrors(now.link.lineErrors);
   const wasPrinting = isPrinting.value;
   snapshot.value = now;
   news();
@@ -214,6 +220,8 @@ function happened(event: MachineEvent): void {
       note('info', 'Paused.');
       break;
     case 'resumed':
+      // What was held goes on: why it was does not stand any more.
+      if (trouble.value === heldFor) trouble.value = null;
       note('info', 'The print goes on.');
       break;
     case 'done':
@@ -221,10 +229,14 @@ function happened(event: MachineEvent): void {
       note('info', 'The print is done.');
       break;
     case 'cancelled':
+      if (trouble.value === heldFor) trouble.value = null;
       outcome.value = 'cancelled';
       note('info', 'The print was cancelled.');
       break;
     case 'held':
+      heldFor = event.trouble;
+      report(event.trouble);
+      break;
     case 'trouble':
       report(event.trouble);
       break;
