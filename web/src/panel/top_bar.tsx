@@ -77,7 +77,11 @@ export function TopBar(): JSX.Element {
       </p>
       <nav class="top-actions" aria-label="Page">
         {isClosed ? (
-          <Button icon="plug" kind="primary" onClick={() => (openDialog.value = 'connect')}>
+          <Button
+            icon="plug"
+            kind={isViewing.value ? 'plain' : 'primary'}
+            onClick={() => (openDialog.value = 'connect')}
+          >
             Connect
           </Button>
         ) : (
