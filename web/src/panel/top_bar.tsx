@@ -28,6 +28,7 @@ const JOBS = {
 export function statusOf(phase: Phase, job: JobStatus): Status {
   if (phase === 'ready') return { text: JOBS[job], tone: 'good' };
   if (phase === 'shutdown') return { text: 'Stopped', tone: 'bad' };
+  if (phase === 'holding') return { text: 'Holding a print', tone: 'busy' };
   return phase === 'failed' ? { text: 'Failed', tone: 'bad' } : { text: 'Connecting', tone: 'busy' };
 }
 
