@@ -120,6 +120,8 @@ test('a new version waits while a print runs, and is loaded when the user says s
   await expect.poll(() => isNext(panel)).toBe(true);
   await expect(panel.status).toContainText('Not connected');
   expect(loads).toBe(1);
-  // The other tab is not touched, and its files are still there.
+  // The other tab is not touched, and reloads when its own user says so.
   expect(await isNext(second)).toBe(false);
+  await second.page.getByRole('button', { name: 'Reload' }).click();
+  await expect.poll(() => isNext(second)).toBe(true);
 });

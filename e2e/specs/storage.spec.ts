@@ -14,18 +14,20 @@ async function storeIn(page: Page): Promise<Worker> {
 }
 
 /** Opens the print and writes; leaves it open. */
-const write = (worker: Worker, id: string): Promise<number> =>
+const write = (worker: Worker, id: string): Promise<{ copied: number; appendMs: number }> =>
   worker.evaluate(async (id) => {
     const { PrintStore } = (globalThis as unknown as { storage: Storage }).storage;
     const print = await new PrintStore().openPrint(id);
+    const began = performance.now();
     for (let row = 0; row < 100; row += 1) print.appendJournal(new Uint8Array(100).fill(row));
+    const appendMs = (performance.now() - began) / 100;
     const part = new Uint8Array(1_000_000).fill(7);
     const told: number[] = [];
     await print.copyFile(new Blob(Array.from({ length: 20 }, () => part)).stream(), (bytes) =>
       told.push(bytes),
     );
     Object.assign(globalThis, { print });
-    return told.at(-1) ?? 0;
+    return { copied: told.at(-1) ?? 0, appendMs };
   }, id);
 
 const failure = (worker: Worker, id: string): Promise<string> =>
@@ -44,7 +46,9 @@ test('a journal and a file outlive a renderer that is killed; one tab at a time 
 }) => {
   watch.expectError(/the page crashed/);
   const first = await storeIn(panel.page);
-  expect(await write(first, 'part-1')).toBe(20_000_000);
+  const { copied, appendMs } = await write(first, 'part-1');
+  console.log(`    a row of the journal to the disk: ${appendMs.toFixed(2)} ms`);
+  expect(copied).toBe(20_000_000);
   const second = new Panel(await context.newPage());
   await second.open();
   const worker = await storeIn(second.page);

@@ -11,6 +11,8 @@ const LOOK_EVERY_MS = 3_600_000;
 
 /** The version that waits. */
 const waiting = signal<ServiceWorker | null>(null);
+/** Another tab has had a new version take over: this one still runs the old one. */
+const isOutdated = signal(false);
 
 const isBusy = computed(
   () => isPrinting.value || watched.value.some(({ view }) => view.snapshot.job !== 'none'),
@@ -18,8 +20,9 @@ const isBusy = computed(
 
 /** Has the waiting version take over, and loads the page anew from it. */
 function reload(): void {
+  if (isBusy.peek()) return;
   const next = waiting.peek();
-  if (!next || isBusy.peek()) return;
+  if (!next) return location.reload();
   navigator.serviceWorker.addEventListener('controllerchange', () => location.reload(), { once: true });
   next.postMessage('take-over');
 }
@@ -33,6 +36,13 @@ function follow(registration: ServiceWorkerRegistration): void {
     registration.installing?.addEventListener('statechange', look);
   });
   look();
+  let isFirst = !navigator.serviceWorker.controller;
+  navigator.serviceWorker.addEventListener('controllerchange', () => {
+    // The first one takes over what it was loaded from.
+    if (!isFirst) isOutdated.value = true;
+    isFirst = false;
+    look();
+  });
   setInterval(() => {
     if (!isBusy.peek()) registration.update().catch(() => undefined);
   }, LOOK_EVERY_MS);
@@ -52,7 +62,7 @@ async function register(): Promise<void> {
 export function startOffline(): void {
   if (!import.meta.env.PROD || !('serviceWorker' in navigator)) return;
   effect(() => {
-    if (!waiting.value) return;
+    if (!waiting.value && !isOutdated.value) return;
     const ends = connection.value === 'closed' ? '' : ' Reloading ends the connection.';
     notify({
       kind: 'version',
