@@ -237,7 +237,7 @@ fn a_short_stall_is_not_noticed() {
     bench.start(&squares(3));
     bench.line(14);
     bench.stalled = true;
-    bench.run(1.8);
+    bench.run(1.7);
     bench.stalled = false;
     bench.job_over();
     bench.job_done();
