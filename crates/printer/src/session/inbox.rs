@@ -6,7 +6,7 @@ use wire::{
     dictionary::{Dictionary, Received},
 };
 
-use super::motion_time::MotionReport;
+use super::{board_heater::HeaterReport, motion_time::MotionReport};
 use crate::link::Link;
 
 /// A message from the board, without borrowed bytes.
@@ -21,6 +21,7 @@ pub(super) enum Message {
     Analog { oid: u8, next_clock: Clock32, sum: u16 },
     Motion(MotionReport),
     Queue { oid: u8, position: i32 },
+    Heater(HeaterReport),
     Shutdown { reason: u16 },
     Starting,
 }
@@ -74,8 +75,9 @@ fn message(response: &Response<'_>) -> Option<Message> {
             Message::Motion(MotionReport::new(clock, motion, rate, state, reason))
         }
         Response::StepperQueue { oid, pos, .. } => Message::Queue { oid, position: pos },
-        Response::Stats { .. } | Response::IdentifyResponse { .. } | Response::HeaterState { .. } => {
-            return None;
+        Response::HeaterState { oid, target, power, state, .. } => {
+            Message::Heater(HeaterReport::new(oid, target, power, state))
         }
+        Response::Stats { .. } | Response::IdentifyResponse { .. } => return None,
     })
 }

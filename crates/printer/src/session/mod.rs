@@ -8,6 +8,7 @@
 //! start another.
 
 mod board;
+mod board_heater;
 mod connect;
 mod console;
 mod event;

@@ -4,6 +4,7 @@
 mod bench;
 mod console;
 mod faults;
+mod heaters;
 mod hold;
 mod link;
 mod machine;
