@@ -20,7 +20,7 @@ use crate::{
 
 mod description;
 
-pub use description::{Description, MOTION_CLOCK};
+pub use description::{BOARD_HEATERS, Description, MOTION_CLOCK};
 
 /// The largest dictionary that is accepted once unpacked: real ones are below 64 KiB.
 pub const DICTIONARY_BYTES_MAX: usize = 1 << 20;
@@ -366,6 +366,7 @@ mod tests {
             ],
             pins: vec![("gpio0".into(), 0, 30), ("LED".into(), 40, 1)],
             motion_clock: true,
+            board_heaters: true,
         };
         Dictionary::parse(&description.compressed()).unwrap()
     }

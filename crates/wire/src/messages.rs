@@ -309,12 +309,37 @@ messages! {
     MotionTie "motion_tie" { oid: u8 }
     /// Asks how far a stepper has come in its rows.
     StepperGetQueue "stepper_get_queue" { oid: u8 }
+
+    // Heaters that the board regulates, an extension of ours (docs/board-heaters.md, with all units).
+    /// A heater: an analog input, sampled with so many readings a sum, that regulates an output.
+    ConfigHeater "config_heater" {
+        oid: u8, adc_oid: u8, out_oid: u8, sample_count: u8, max_power: u16, smooth: u16
+    }
+    /// The next point of the sensor's curve.
+    HeaterPoint "heater_point" { oid: u8, sum: u16, temperature: i32 }
+    /// Regulates by PID.
+    HeaterPid "heater_pid" { oid: u8, kp: u32, ki: u32, kd: u32 }
+    /// Regulates on and off, `delta` around the target.
+    HeaterWatermark "heater_watermark" { oid: u8, delta: u32 }
+    /// What a sound heater does.
+    HeaterCheck "heater_check" { oid: u8, max_error: u32, gain_time: u32, hysteresis: u32, gain: u32 }
+    /// A target, and what becomes of it when the host falls silent.
+    HeaterSet "heater_set" { oid: u8, target: i32, standby: i32, standby_s: u16 }
+    /// The host lives until the clock `alive`.
+    HeaterLease "heater_lease" { alive: u32 }
+    /// Asks for the state of a heater.
+    HeaterGetState "heater_get_state" { oid: u8 }
 }
 
 impl CommandKind {
     /// Whether a board with plain Klipper firmware lacks this command.
     pub const fn is_extension(self) -> bool {
         self as u16 >= Self::MotionLease as u16
+    }
+
+    /// Whether it belongs to the heaters that a board regulates.
+    pub const fn is_heater(self) -> bool {
+        self as u16 >= Self::ConfigHeater as u16 && self as u16 <= Self::HeaterGetState as u16
     }
 }
 
@@ -355,12 +380,21 @@ messages! {
     StepperQueue "stepper_queue" {
         oid: u8, job: u32, received: u32, done: u32, left: u16, next: u32, dir: u8, pos: i32, crc: u32
     }
+
+    // Heaters, as above.
+    /// What a heater read at `clock`, what it is held at, its power, and why.
+    HeaterState "heater_state" { oid: u8, clock: u32, temperature: i32, target: i32, power: u16, state: u8 }
 }
 
 impl ResponseKind {
     /// Whether a board with plain Klipper firmware lacks this message.
     pub const fn is_extension(self) -> bool {
         self as u16 >= Self::MotionState as u16
+    }
+
+    /// Whether it belongs to the heaters that a board regulates.
+    pub const fn is_heater(self) -> bool {
+        matches!(self, Self::HeaterState)
     }
 }
 

@@ -24,6 +24,9 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         board: &mut impl Board,
         command: Command<'_>,
     ) -> Result<(), ShutdownReason> {
+        if command.kind().is_heater() {
+            return self.dispatch_heater(board, &command);
+        }
         if command.kind().is_extension() {
             return self.dispatch_motion(board, &command);
         }
@@ -228,6 +231,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             Command::QueryAnalogIn { .. } => self.sample(board, command),
             Command::QueueDigitalOut { oid, clock, on_ticks } => {
                 let output = self.objects.digital_out(oid)?;
+                output.check_free()?;
                 let change = OutputMove { clock, on_ticks };
                 output.queue(board.now(), &mut self.moves, &self.hold.clock, change)?;
                 let wake = output.wake(&self.hold.clock);
@@ -236,6 +240,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             }
             Command::UpdateDigitalOut { oid, value } => {
                 let output = self.objects.digital_out(oid)?;
+                output.check_free()?;
                 output.update(board, &mut self.moves, value != 0);
                 let wake = output.wake(&self.hold.clock);
                 self.reset_output_timer(oid, wake);
@@ -321,6 +326,11 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         else {
             return Ok(());
         };
+        // Another number of readings would give the heater another temperature.
+        let is_other = |count| sample_count != 0 && sample_count != count;
+        if self.heaters.fed_by(oid).is_some_and(|heater| is_other(heater.wiring.sample_count)) {
+            return Err(ShutdownReason::InvalidHeater);
+        }
         let clock = Clock32(clock);
         let sampling = Sampling {
             sample_ticks,

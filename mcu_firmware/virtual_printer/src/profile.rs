@@ -32,6 +32,8 @@ pub struct BoardProfile {
     pub restart: Seconds,
     /// Whether the firmware has our motion clock. Without it the board is as one with plain Klipper firmware.
     pub motion_clock: bool,
+    /// Whether the firmware regulates heaters.
+    pub board_heaters: bool,
 }
 
 /// Most moves that any board's queue holds.
@@ -69,10 +71,10 @@ impl BoardProfile {
         Some(if is_plain { profile.plain() } else { profile })
     }
 
-    /// The same board with plain Klipper firmware: without a motion clock.
+    /// The same board with plain Klipper firmware: without a motion clock and without heaters of its own.
     #[must_use]
     pub fn plain(self) -> Self {
-        Self { motion_clock: false, ..self }
+        Self { motion_clock: false, board_heaters: false, ..self }
     }
 
     /// Every board.
@@ -94,6 +96,7 @@ impl BoardProfile {
             clock_at_start: before_the_wrap(clock),
             restart: Seconds(0.5),
             motion_clock: true,
+            board_heaters: true,
         }
     }
 
@@ -111,6 +114,7 @@ impl BoardProfile {
             clock_at_start: before_the_wrap(clock),
             restart: Seconds(0.1),
             motion_clock: true,
+            board_heaters: true,
         }
     }
 
@@ -149,6 +153,7 @@ impl BoardProfile {
             constants,
             pins: self.pins.iter().map(|&(name, first, count)| (name.to_owned(), first, count)).collect(),
             motion_clock: self.motion_clock,
+            board_heaters: self.board_heaters,
         }
     }
 }

@@ -21,12 +21,18 @@ pub struct Description {
     pub pins: Vec<(String, u8, u8)>,
     /// Whether the board has the motion clock: its messages, and the constant [`MOTION_CLOCK`].
     pub motion_clock: bool,
+    /// Whether the board regulates heaters: the messages for that, and the constant [`BOARD_HEATERS`].
+    pub board_heaters: bool,
 }
 
 /// The constant by which a board says that it has a motion clock: the extension's version.
 pub const MOTION_CLOCK: &str = "MOTION_CLOCK";
 /// The version that is described in docs/motion-clock.md.
 const MOTION_CLOCK_VERSION: f64 = 1.0;
+/// The constant by which a board says that it regulates heaters: the extension's version.
+pub const BOARD_HEATERS: &str = "BOARD_HEATERS";
+/// The version that is described in docs/board-heaters.md.
+const BOARD_HEATERS_VERSION: f64 = 1.0;
 
 impl Description {
     /// The dictionary as JSON.
@@ -44,22 +50,31 @@ impl Description {
         let reasons = ShutdownReason::ALL
             .iter()
             .map(|&reason| (reason.text().to_owned(), EnumerationValue::One(i64::from(reason as u16))));
-        let extension =
-            self.motion_clock.then(|| (MOTION_CLOCK.to_owned(), Constant::Number(MOTION_CLOCK_VERSION)));
+        let extensions = [
+            (self.motion_clock, MOTION_CLOCK, MOTION_CLOCK_VERSION),
+            (self.board_heaters, BOARD_HEATERS, BOARD_HEATERS_VERSION),
+        ];
+        let extensions = extensions.into_iter().filter(|&(has, ..)| has);
+        let extensions = extensions.map(|(_, name, version)| (name.to_owned(), Constant::Number(version)));
+        let has = |is_extension: bool, is_heater: bool| match (is_extension, is_heater) {
+            (_, true) => self.board_heaters,
+            (true, false) => self.motion_clock,
+            (false, false) => true,
+        };
         let json = Json {
             version: self.version.clone(),
             build_versions: self.build_versions.clone(),
-            config: self.constants.iter().cloned().chain(extension).collect(),
+            config: self.constants.iter().cloned().chain(extensions).collect(),
             commands: formats(
                 &mut CommandKind::ALL
                     .iter()
-                    .filter(|kind| self.motion_clock || !kind.is_extension())
+                    .filter(|kind| has(kind.is_extension(), kind.is_heater()))
                     .map(|kind| kind.spec()),
             ),
             responses: formats(
                 &mut ResponseKind::ALL
                     .iter()
-                    .filter(|kind| self.motion_clock || !kind.is_extension())
+                    .filter(|kind| has(kind.is_extension(), kind.is_heater()))
                     .map(|kind| kind.spec()),
             ),
             output: BTreeMap::new(),

@@ -2,6 +2,7 @@
 
 mod bench;
 mod faults;
+mod heaters;
 mod hold;
 mod homing;
 mod inputs;
