@@ -129,6 +129,7 @@ function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
       temperature: celsius(heater.temperature_c),
       target: celsius(heater.target_c),
       duty: share(heater.duty),
+      isStandby: heater.standby,
     })),
     position: position && place(position),
     homed: now.homed,
