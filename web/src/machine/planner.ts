@@ -188,6 +188,7 @@ class WasmSession implements Session {
       confirmed_lines: isAll ? [] : [...confirmedLines],
       confirm_all: isAll,
       journal: null,
+      start_line: null,
     };
     return refusal(() => this.#inner.start_job(JSON.stringify(request), now));
   }
