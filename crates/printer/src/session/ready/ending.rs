@@ -202,6 +202,7 @@ impl Ready {
 
     fn forget_job(&mut self, event: Event) {
         self.job = None;
+        self.diary.end();
         self.held = Held::default();
         self.planner.drop_barrier();
         self.console.clear();

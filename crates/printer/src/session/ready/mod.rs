@@ -6,6 +6,7 @@
 mod ending;
 mod hold;
 mod plan;
+mod take_up;
 mod waiting;
 
 use gcode::LineNumber;
@@ -19,6 +20,7 @@ use super::{
     board::Board,
     connect,
     console::Console,
+    diary::Diary,
     event::{Event, Events},
     inbox::{self, Message},
     job::{Job, JobStatus, PROGRESS_INTERVAL},
@@ -66,6 +68,7 @@ pub(super) struct Ready {
     /// What a paused job was waiting for.
     held: Held,
     pub(super) events: Events,
+    pub(super) diary: Diary,
     pub(super) last_active: Seconds,
     lease: Lease,
     /// Motion is held.
@@ -76,13 +79,18 @@ pub(super) struct Ready {
 }
 
 impl Ready {
-    pub(super) fn new(config: PrinterConfig, mut board: Board, now: Seconds) -> Result<Self, PrinterError> {
-        let mut planner = Planner::new(&config, board.clock)?;
+    pub(super) fn new(config: PrinterConfig, board: Board, now: Seconds) -> Result<Self, PrinterError> {
+        let planner = Planner::new(&config, board.clock)?;
+        let mut ready = Self::with_planner(config, board, planner, now);
+        ready.planner.adopt(&mut ready.console.source);
+        Ok(ready)
+    }
+
+    fn with_planner(config: PrinterConfig, mut board: Board, planner: Planner, now: Seconds) -> Self {
         let thermal = Thermal::start(&config, &mut board, now);
-        let mut console = Console::new(Source::new(machine::gcode_settings(&config)));
-        planner.adopt(&mut console.source);
+        let console = Console::new(Source::new(machine::gcode_settings(&config)));
         let lease = Lease::new(&config);
-        Ok(Self {
+        Self {
             config,
             board,
             planner,
@@ -94,12 +102,13 @@ impl Ready {
             wait: Wait::Nothing,
             held: Held::default(),
             events: Events::default(),
+            diary: Diary::default(),
             last_active: now,
             lease,
             hold: None,
             have_heaters_fallen: false,
             calls: Calls::default(),
-        })
+        }
     }
 
     /// What the job is doing.
@@ -162,7 +171,7 @@ impl Ready {
                 self.have_heaters_fallen |= self.thermal.on_board_heater(report, now);
             }
             Message::Motion(report) => self.on_motion(&report, now),
-            Message::Queue { oid, position } => self.on_queue(oid, position),
+            Message::Queue { oid, queue, .. } => self.on_queue(oid, &queue),
             Message::Position { .. } | Message::Endstop { .. } | Message::Trigger { .. } => {
                 self.on_homing_message(message, now);
             }
@@ -227,6 +236,9 @@ impl Ready {
 
     /// Does what is due by the motion clock, and what follows from it.
     fn go_on(&mut self, now: Seconds) -> Result<(), Failure> {
+        if self.waits_to_rejoin() {
+            return self.advance_hold(now);
+        }
         let motion_now = self.board.motion_at(now);
         while let Some(due) = self.stream.pop_due(motion_now) {
             self.on_due(due, now);
@@ -249,6 +261,9 @@ impl Ready {
         match due {
             Due::MoveEnd(made) => {
                 let elapsed = self.stream.elapsed(made.end, &self.board);
+                if made.line > 0 && self.plans_job() {
+                    self.diary.progress(made.line, elapsed, now);
+                }
                 if let Some(job) =
                     self.job.as_mut().filter(|job| made.line > 0 && now - job.told >= PROGRESS_INTERVAL)
                 {
