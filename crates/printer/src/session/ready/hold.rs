@@ -49,10 +49,9 @@ enum Phase {
     AtRest,
     /// The user wants to go on: what has cooled is heated again.
     Heating,
-    /// It is hot enough. The user wants to go on with what another host began: the board drops what it has, and gets it
-    /// again.
+    /// Hot enough, with what another host began: the board drops what it has, and gets it again.
     Rejoining { since: Seconds, asked: Seconds, answered: [bool; MOTORS] },
-    /// It is hot enough, and the board has what is to be made; since when it has been told, if it has.
+    /// It may go on; since when the board has been told, if it has.
     Resuming(Option<Ticks>),
     /// The user wants to end it: the queue is dropped, and each motor says where it stands.
     Dropping { since: Seconds, asked: Seconds, counts: [Option<i32>; MOTORS] },
@@ -77,12 +76,11 @@ pub(super) struct Hold {
 }
 
 impl Hold {
-    /// What follows once it is hot enough.
-    fn when_hot(&self, now: Seconds) -> Phase {
+    /// What comes once it is warm enough.
+    const fn warm(&self, now: Seconds) -> Phase {
         match &self.rest {
             Some(_) => {
-                let asked = Seconds(f64::NEG_INFINITY);
-                Phase::Rejoining { since: now, asked, answered: [false; MOTORS] }
+                Phase::Rejoining { since: now, asked: Seconds(f64::NEG_INFINITY), answered: [false; MOTORS] }
             }
             None => Phase::Resuming(None),
         }
@@ -169,7 +167,7 @@ impl Ready {
             phase: Phase::Slowing,
             reason: HoldReason::HostAway,
             nozzle: None,
-            could_extrude: rest.is_hot(),
+            could_extrude: rest.is_nozzle_on(),
             targets: rest.targets.clone(),
             is_told: false,
             rest: Some(Box::new(rest)),
@@ -213,7 +211,7 @@ impl Ready {
         let heats = self.heat_again(&hold.targets, hold.could_extrude, has_cooled, now);
         let phase = match heats {
             Ok(true) => Phase::Heating,
-            Ok(false) => hold.when_hot(now),
+            Ok(false) => hold.warm(now),
             Err(_) => Phase::AtRest,
         };
         self.hold = Some(Hold { phase, ..hold });
@@ -330,7 +328,7 @@ impl Ready {
             Phase::Heating => {
                 self.last_active = now;
                 if self.thermal.is_heated() {
-                    hold.phase = hold.when_hot(now);
+                    hold.phase = hold.warm(now);
                 }
             }
             Phase::Resuming(told @ None) => {

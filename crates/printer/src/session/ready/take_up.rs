@@ -101,7 +101,7 @@ impl Ready {
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
         job.source = taken.source;
         job.has_moved = true;
-        job.leaves_hot = rest.is_hot();
+        job.leaves_hot = rest.is_nozzle_on();
         job.told = now;
         ready.job = Some(job);
         ready.hold_for_host(rest);
@@ -121,10 +121,11 @@ impl Ready {
 }
 
 impl Rest {
-    /// Whether the print had its nozzle heated.
-    pub(super) fn is_hot(&self) -> bool {
-        let is_nozzle = |&(heater, _): &&(gcode::Heater, Celsius)| *heater == gcode::Heater::Tool(0);
-        self.targets.iter().find(is_nozzle).is_some_and(|&(_, target)| target > Celsius::ZERO)
+    /// Whether the print had the nozzle hot.
+    pub(super) fn is_nozzle_on(&self) -> bool {
+        self.targets
+            .iter()
+            .any(|&(heater, target)| heater == gcode::Heater::Tool(0) && target > Celsius::ZERO)
     }
 
     /// An action whose time has passed.
