@@ -177,7 +177,7 @@ test('without a copy of the file the user is asked for it, and another one is re
     await (await asking).setFiles({ name: 'part.gcode', mimeType: 'text/x.gcode', buffer });
   };
   await give(`${GCODE}; sliced again\n`, 'Open the file');
-  await expect(dialog).toContainText('part.gcode has another size');
+  await expect(dialog).toContainText('part.gcode had another size or other content');
   const still = pulses(printer);
   await give(GCODE.replaceAll('X150 Y150', 'X150 Y151'), 'Open the file');
   await expect(dialog).toContainText('cannot be taken up with its next step');

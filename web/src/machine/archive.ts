@@ -114,10 +114,18 @@ export class PrintLog {
   }
 
   async #copy(file: Blob, hasRoom: Promise<boolean>): Promise<void> {
-    if (!(await hasRoom.catch(() => true))) throw new StorageError('full');
-    await this.#open.copyFile(file.stream(), () => {
+    const goOn = (): void => {
       if (this.#isOver) throw new StorageError('incomplete');
-    });
+    };
+    try {
+      if (!(await hasRoom.catch(() => true))) throw new StorageError('full');
+      await this.#open.copyFile(file.stream(), goOn);
+    } catch (error) {
+      goOn();
+      // The file will have to be given again: then it is known again, at least.
+      await this.#open.markFile(file.stream(), goOn);
+      throw error;
+    }
   }
 
   /** Settles once nothing of it is open any more. */
@@ -255,6 +263,11 @@ export class Archive {
       if (error instanceof StorageError) return null;
       throw error;
     }
+  }
+
+  /** Whether a file from the user can be the print's. Rejects where nothing can be read. */
+  async isItsFile({ id, fileBytes }: KeptPrint, file: Blob): Promise<boolean> {
+    return file.size === fileBytes && (await this.#store.isItsFile(id, file));
   }
 
   /** Opens a record again, to be added to. Rejects where another tab has it. */

@@ -125,10 +125,13 @@ export class Continuation {
   give(file: Blob): void {
     const [held, found] = [this.#held, this.#found];
     if (!found || (held?.kind !== 'needs-file' && held?.kind !== 'refused')) return;
-    const { print } = found;
-    if (file.size !== print.fileBytes)
-      return this.#put({ kind: 'needs-file', print, trouble: otherFile(print.facts.name) });
-    this.#next((round) => this.#begin(found, file, round, false));
+    this.#next(async (round) => {
+      const isIts = await this.#of.archive.isItsFile(found.print, file).catch(() => false);
+      if (round !== this.#round) return;
+      const { print } = found;
+      if (isIts) await this.#begin(found, file, round, false);
+      else this.#put({ kind: 'needs-file', print, trouble: otherFile(print.facts.name) });
+    });
   }
 
   async #begin(found: Found, file: Blob, round: number, isCopy: boolean): Promise<void> {

@@ -3,7 +3,7 @@
 // once.
 //
 // Knows nothing of what a journal says. Layout: prints/<id>/journal, prints/<id>/about, prints/<id>/file, and
-// prints/<id>/complete with the copy's size and CRC-32 once it is whole. Bounded: so many prints, so long a journal; the
+// prints/<id>/complete with the file's size and CRC-32 once it has been read to its end. Bounded: so many prints, so long a journal; the
 // oldest prints go first. Sizes in bytes.
 import { Crc32 } from './crc32';
 
@@ -157,6 +157,15 @@ export class OpenPrint {
     });
   }
 
+  /** Reads the file through without a copy of it: by its check it is known again. `progress` as with a copy. */
+  async markFile(stream: ReadableStream<Uint8Array>, progress: (bytes: number) => void): Promise<void> {
+    await tried(async () => {
+      const mark = await fill(null, stream, progress);
+      await this.#folder.removeEntry(FILE).catch(ignoreMissing);
+      await writeWhole(this.#folder, COMPLETE, new TextEncoder().encode(mark));
+    });
+  }
+
   close(): void {
     if (this.#isClosed) return;
     this.#isClosed = true;
@@ -179,9 +188,16 @@ async function writeWhole(folder: FileSystemDirectoryHandle, name: string, bytes
 /** What is written down of a copy: its size and its check. */
 const markOf = (bytes: number, crc: Crc32): string => `${bytes} ${crc.text}`;
 
-/** Fills the file; its mark. */
+async function markOfFile(file: Blob): Promise<string> {
+  const crc = new Crc32();
+  const reader = file.stream().getReader();
+  for (let piece = await reader.read(); !piece.done; piece = await reader.read()) crc.add(piece.value);
+  return markOf(file.size, crc);
+}
+
+/** Fills the file, where there is one; its mark. */
 async function fill(
-  file: SyncFile,
+  file: SyncFile | null,
   stream: ReadableStream<Uint8Array>,
   progress: (bytes: number) => void,
 ): Promise<string> {
@@ -189,22 +205,22 @@ async function fill(
   const crc = new Crc32();
   let bytes = 0;
   try {
-    file.truncate(0);
+    file?.truncate(0);
     for (;;) {
       const { value, done } = await reader.read();
       if (done) break;
-      writeAll(file, value, bytes);
+      if (file) writeAll(file, value, bytes);
       crc.add(value);
       bytes += value.byteLength;
       progress(bytes);
     }
-    file.flush();
+    file?.flush();
     return markOf(bytes, crc);
   } catch (error) {
     await reader.cancel(error).catch(() => undefined);
     throw error;
   } finally {
-    file.close();
+    file?.close();
   }
 }
 
@@ -297,11 +313,16 @@ export class PrintStore {
       const mark = await markIn(folder);
       if (mark === null) throw new StorageError('incomplete');
       const file = await (await folder.getFileHandle(FILE)).getFile();
-      const crc = new Crc32();
-      const reader = file.stream().getReader();
-      for (let piece = await reader.read(); !piece.done; piece = await reader.read()) crc.add(piece.value);
-      if (mark !== markOf(file.size, crc)) throw new StorageError('incomplete');
+      if (mark !== (await markOfFile(file))) throw new StorageError('incomplete');
       return file;
+    });
+  }
+
+  /** Whether a file is the print's, byte by byte, as far as that is known. */
+  async isItsFile(id: string, file: Blob): Promise<boolean> {
+    return await tried(async () => {
+      const mark = await markIn(await this.#folder(id));
+      return mark === null || mark === (await markOfFile(file));
     });
   }
 
@@ -326,8 +347,13 @@ async function markIn(folder: FileSystemDirectoryHandle): Promise<string | null>
 async function copiedBytes(folder: FileSystemDirectoryHandle): Promise<number | null> {
   const mark = await markIn(folder);
   if (mark === null) return null;
-  const { size } = await (await folder.getFileHandle(FILE)).getFile();
-  return mark.startsWith(`${size} `) ? size : null;
+  try {
+    const { size } = await (await folder.getFileHandle(FILE)).getFile();
+    return mark.startsWith(`${size} `) ? size : null;
+  } catch (error) {
+    ignoreMissing(error);
+    return null;
+  }
 }
 
 async function describe(id: string, folder: FileSystemDirectoryHandle): Promise<StoredPrint> {

@@ -222,7 +222,7 @@ export const copyMissing = (code: StorageCode): Trouble =>
 export const otherFile = (name: string): Trouble =>
   trouble(
     'other-file',
-    `That is not the file that was being printed: ${name} has another size.`,
+    `That is not the file that was being printed: ${name} had another size or other content.`,
     'Nothing was sent to the printer; the board goes on holding the print.',
     'Open the very file that the print was started with; one that was sliced again does not fit.',
   );
