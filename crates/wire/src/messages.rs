@@ -309,12 +309,34 @@ messages! {
     MotionTie "motion_tie" { oid: u8 }
     /// Asks how far a stepper has come in its rows.
     StepperGetQueue "stepper_get_queue" { oid: u8 }
+
+    // The block check, an extension of ours (docs/block-check.md).
+    /// The CRC-32 over all of the block before it; from the first right one on the board takes no block without.
+    BlockCheck "block_check" { crc: u32 }
+}
+
+/// What plain Klipper firmware lacks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extension {
+    /// The motion clock: hold, resume and lease.
+    MotionClock,
+    /// The check over whole blocks.
+    BlockCheck,
 }
 
 impl CommandKind {
+    /// The extension that this command belongs to; `None` for those of plain Klipper firmware.
+    pub const fn extension(self) -> Option<Extension> {
+        match self {
+            Self::BlockCheck => Some(Extension::BlockCheck),
+            _ if self as u16 >= Self::MotionLease as u16 => Some(Extension::MotionClock),
+            _ => None,
+        }
+    }
+
     /// Whether a board with plain Klipper firmware lacks this command.
     pub const fn is_extension(self) -> bool {
-        self as u16 >= Self::MotionLease as u16
+        self.extension().is_some()
     }
 }
 
@@ -355,18 +377,27 @@ messages! {
     StepperQueue "stepper_queue" {
         oid: u8, job: u32, received: u32, done: u32, left: u16, next: u32, dir: u8, pos: i32, crc: u32
     }
+
+    // The block check, as above.
+    /// The CRC-32 over all of the block before it.
+    BlockChecked "block_checked" { crc: u32 }
 }
 
 impl ResponseKind {
-    /// Whether a board with plain Klipper firmware lacks this message.
-    pub const fn is_extension(self) -> bool {
-        self as u16 >= Self::MotionState as u16
+    /// The extension that this message belongs to; `None` for those of plain Klipper firmware.
+    pub const fn extension(self) -> Option<Extension> {
+        match self {
+            Self::BlockChecked => Some(Extension::BlockCheck),
+            _ if self as u16 >= Self::MotionState as u16 => Some(Extension::MotionClock),
+            _ => None,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::check::MESSAGE_BYTES_MAX;
     use alloc::{vec, vec::Vec};
     use proptest::prelude::*;
 
@@ -381,6 +412,24 @@ mod tests {
         assert!(ids.iter().all(|&id| id < 96), "all numbers travel as one byte");
         assert_eq!(CommandKind::Identify.spec().id, 1);
         assert_eq!(ResponseKind::IdentifyResponse.spec().id, 0);
+    }
+
+    #[test]
+    fn every_message_fits_a_block_beside_a_check() {
+        let longest = |spec: MessageSpec| -> usize {
+            let field = |field: &FieldSpec| match field.format {
+                "%u" | "%i" => 5,
+                "%hu" | "%hi" => 3,
+                "%c" => 2,
+                // Whoever fills such a field keeps it short.
+                _ => 0,
+            };
+            1 + spec.fields.iter().map(field).sum::<usize>()
+        };
+        let commands = CommandKind::ALL.iter().map(|kind| kind.spec());
+        for spec in commands.chain(ResponseKind::ALL.iter().map(|kind| kind.spec())) {
+            assert!(longest(spec) <= MESSAGE_BYTES_MAX, "{}", spec.name);
+        }
     }
 
     #[test]

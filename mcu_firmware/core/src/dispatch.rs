@@ -15,8 +15,8 @@ use crate::{
     trsync::Trsync,
 };
 
-/// The most dictionary bytes in one `identify_response`, so that it fits a block whatever its offset.
-const IDENTIFY_BYTES_MAX: u8 = 50;
+/// The most dictionary bytes in one `identify_response`, so that it fits a block whatever its offset, check and all.
+const IDENTIFY_BYTES_MAX: u8 = 46;
 
 impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     pub(crate) fn dispatch(

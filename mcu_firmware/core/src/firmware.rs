@@ -48,10 +48,12 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
         self
     }
 
-    /// As a board with plain Klipper firmware: the motion clock is the hardware clock, and its commands do not exist.
+    /// As a board with plain Klipper firmware: the motion clock is the hardware clock, and the commands of our
+    /// extensions do not exist.
     #[must_use]
-    pub const fn without_motion_clock(mut self) -> Self {
+    pub const fn plain(mut self) -> Self {
         self.core.has_motion_clock = false;
+        self.core.receiver.without_check();
         self
     }
 
@@ -144,23 +146,32 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     }
 
     fn frame(&mut self, board: &mut impl Board, frame: Frame<'_>) {
-        if let Frame::Block { sequence, payload } = frame
-            && self.receiver.accept(sequence)
-        {
-            self.obey(board, payload);
+        match frame {
+            Frame::Block { sequence, payload } => {
+                if let Some(messages) = self.receiver.accept(sequence, payload) {
+                    self.obey(board, sequence, messages);
+                }
+            }
+            Frame::Garbage => self.receiver.garbage(),
         }
         self.receiver.acknowledge(board);
     }
 
     /// Obeys the messages of one block, in order.
-    fn obey(&mut self, board: &mut impl Board, mut payload: &[u8]) {
+    fn obey(&mut self, board: &mut impl Board, sequence: u8, messages: &[u8]) {
         let mut refused = false;
-        while !payload.is_empty() {
+        let mut rest = messages;
+        while !rest.is_empty() {
             // What follows a message that does not decode cannot be understood either.
-            let Ok(command) = Command::decode(&mut payload) else {
+            let Ok(command) = Command::decode(&mut rest) else {
                 self.shut_down(board, ShutdownReason::CommandParser);
                 return;
             };
+            if matches!(command, Command::BlockCheck { .. })
+                && self.receiver.met_check(sequence, messages, rest)
+            {
+                continue;
+            }
             if self.halt.reason().is_some() && !is_allowed(&command) {
                 // Once a block is enough: a block may hold many commands.
                 if !refused && let Some(refusal) = self.halt.refusal() {

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `board` | what is asked of a chip |
 //! | `firmware`, `dispatch` | the whole; what each command does |
-//! | `receiver` | sequence numbers and acknowledgements |
+//! | `receiver` | sequence numbers, checks and acknowledgements |
 //! | `motion_clock`, `hold`, `motion_commands` | the clock that steps are due on; when it slows down and stops |
 //! | `scheduler`, `moves` | timers; the pool of queued moves |
 //! | `objects` | what was configured, by oid |

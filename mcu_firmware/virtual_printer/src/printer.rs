@@ -378,7 +378,7 @@ impl<R: Recorder> VirtualPrinter<R> {
 
 fn new_firmware(profile: &BoardProfile) -> Box<Firmware<OBJECTS_MAX, MOVES_MAX>> {
     let firmware = Firmware::new(profile.clock).with_move_count(profile.move_count);
-    Box::new(if profile.motion_clock { firmware } else { firmware.without_motion_clock() })
+    Box::new(if profile.extensions { firmware } else { firmware.plain() })
 }
 
 fn motor_view(axis: &Axis) -> MotorView {

@@ -30,8 +30,9 @@ pub struct BoardProfile {
     pub clock_at_start: Ticks,
     /// What a restart of the firmware takes; a USB board is gone from the bus in the meantime.
     pub restart: Seconds,
-    /// Whether the firmware has our motion clock. Without it the board is as one with plain Klipper firmware.
-    pub motion_clock: bool,
+    /// Whether the firmware has our extensions: the motion clock and the block check. Without them the board is as one
+    /// with plain Klipper firmware.
+    pub extensions: bool,
 }
 
 /// Most moves that any board's queue holds.
@@ -69,10 +70,10 @@ impl BoardProfile {
         Some(if is_plain { profile.plain() } else { profile })
     }
 
-    /// The same board with plain Klipper firmware: without a motion clock.
+    /// The same board with plain Klipper firmware: without our extensions.
     #[must_use]
     pub fn plain(self) -> Self {
-        Self { motion_clock: false, ..self }
+        Self { extensions: false, ..self }
     }
 
     /// Every board.
@@ -93,7 +94,7 @@ impl BoardProfile {
             link: LinkProfile::Usb,
             clock_at_start: before_the_wrap(clock),
             restart: Seconds(0.5),
-            motion_clock: true,
+            extensions: true,
         }
     }
 
@@ -110,7 +111,7 @@ impl BoardProfile {
             link: LinkProfile::Uart { baud: 250_000, receive_window: 192 },
             clock_at_start: before_the_wrap(clock),
             restart: Seconds(0.1),
-            motion_clock: true,
+            extensions: true,
         }
     }
 
@@ -148,7 +149,8 @@ impl BoardProfile {
             build_versions: "virtual".to_owned(),
             constants,
             pins: self.pins.iter().map(|&(name, first, count)| (name.to_owned(), first, count)).collect(),
-            motion_clock: self.motion_clock,
+            motion_clock: self.extensions,
+            block_check: self.extensions,
         }
     }
 }

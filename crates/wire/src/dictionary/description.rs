@@ -4,7 +4,7 @@ use alloc::{borrow::ToOwned, collections::BTreeMap, string::String, vec::Vec};
 
 use super::{Constant, EnumerationValue, Json, format_of};
 use crate::{
-    messages::{CommandKind, MessageSpec, ResponseKind},
+    messages::{CommandKind, Extension, MessageSpec, ResponseKind},
     shutdown::ShutdownReason,
 };
 
@@ -21,14 +21,28 @@ pub struct Description {
     pub pins: Vec<(String, u8, u8)>,
     /// Whether the board has the motion clock: its messages, and the constant [`MOTION_CLOCK`].
     pub motion_clock: bool,
+    /// Whether the board knows the block check: its messages, and the constant [`BLOCK_CHECK`].
+    pub block_check: bool,
 }
 
 /// The constant by which a board says that it has a motion clock: the extension's version.
 pub const MOTION_CLOCK: &str = "MOTION_CLOCK";
 /// The version that is described in docs/motion-clock.md.
 const MOTION_CLOCK_VERSION: f64 = 1.0;
+/// The constant by which a board says that it knows the block check: the extension's version.
+pub const BLOCK_CHECK: &str = "BLOCK_CHECK";
+/// The version that is described in docs/block-check.md.
+pub const BLOCK_CHECK_VERSION: f64 = 1.0;
 
 impl Description {
+    const fn has(&self, extension: Option<Extension>) -> bool {
+        match extension {
+            None => true,
+            Some(Extension::MotionClock) => self.motion_clock,
+            Some(Extension::BlockCheck) => self.block_check,
+        }
+    }
+
     /// The dictionary as JSON.
     pub fn json(&self) -> String {
         let formats = |specs: &mut dyn Iterator<Item = MessageSpec>| -> BTreeMap<String, i32> {
@@ -44,22 +58,28 @@ impl Description {
         let reasons = ShutdownReason::ALL
             .iter()
             .map(|&reason| (reason.text().to_owned(), EnumerationValue::One(i64::from(reason as u16))));
-        let extension =
-            self.motion_clock.then(|| (MOTION_CLOCK.to_owned(), Constant::Number(MOTION_CLOCK_VERSION)));
+        let versions = [
+            (Extension::MotionClock, MOTION_CLOCK, MOTION_CLOCK_VERSION),
+            (Extension::BlockCheck, BLOCK_CHECK, BLOCK_CHECK_VERSION),
+        ];
+        let extensions = versions
+            .into_iter()
+            .filter(|&(extension, ..)| self.has(Some(extension)))
+            .map(|(_, name, version)| (name.to_owned(), Constant::Number(version)));
         let json = Json {
             version: self.version.clone(),
             build_versions: self.build_versions.clone(),
-            config: self.constants.iter().cloned().chain(extension).collect(),
+            config: self.constants.iter().cloned().chain(extensions).collect(),
             commands: formats(
                 &mut CommandKind::ALL
                     .iter()
-                    .filter(|kind| self.motion_clock || !kind.is_extension())
+                    .filter(|kind| self.has(kind.extension()))
                     .map(|kind| kind.spec()),
             ),
             responses: formats(
                 &mut ResponseKind::ALL
                     .iter()
-                    .filter(|kind| self.motion_clock || !kind.is_extension())
+                    .filter(|kind| self.has(kind.extension()))
                     .map(|kind| kind.spec()),
             ),
             output: BTreeMap::new(),
