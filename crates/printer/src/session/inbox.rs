@@ -74,6 +74,8 @@ fn message(response: &Response<'_>) -> Option<Message> {
             Message::Motion(MotionReport::new(clock, motion, rate, state, reason))
         }
         Response::StepperQueue { oid, pos, .. } => Message::Queue { oid, position: pos },
-        Response::Stats { .. } | Response::IdentifyResponse { .. } => return None,
+        Response::Stats { .. } | Response::IdentifyResponse { .. } | Response::BlockChecked { .. } => {
+            return None;
+        }
     })
 }

@@ -105,6 +105,24 @@ fn a_cable_that_is_pulled() {
 }
 
 #[test]
+fn blocks_are_checked_where_the_board_knows_how() {
+    for board in BoardProfile::all() {
+        for (board, checked) in [(board.clone(), true), (board.plain(), false)] {
+            let setup = Setup { board, ..Setup::default() };
+            let mut bench = setup.ready();
+            assert_eq!(bench.session.link_stats().unwrap().checked, checked);
+            // A host that died leaves a board that takes nothing without a check; the next one finds in all the same.
+            bench.gcode("M104 S200");
+            bench.replace_session(&setup.config);
+            bench.connect();
+            let stats = bench.session.link_stats().unwrap();
+            assert_eq!((stats.checked, stats.unchecked), (checked, 0));
+            bench.home();
+        }
+    }
+}
+
+#[test]
 fn a_board_that_another_host_left_configured() {
     let mut bench = Setup::default().ready();
     bench.home();
