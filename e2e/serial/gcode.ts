@@ -45,12 +45,16 @@ export function endOf(gcode: string): [number, number, number] {
   return place;
 }
 
-/** A print of XY moves alone that heats both heaters without waiting, rests after homing, and takes at least so long. */
-export function strolling(seconds: number): string {
+/**
+ * A print of XY moves alone that heats both heaters without waiting, or leaves them cold, rests after homing, and takes
+ * at least so long.
+ */
+export function strolling(seconds: number, isCold = false): string {
   const speedMmS = 100;
   const sides = Math.ceil((seconds * speedMmS) / 100);
   const corners = ['X150 Y50', 'X150 Y150', 'X50 Y150', 'X50 Y50'];
   const moves = Array.from({ length: sides }, (_, side) => `G1 ${corners[side % corners.length]}`);
-  const start = ['M140 S60', 'M104 S200', 'G28', 'G4 P8000', 'G1 X50 Y50 Z5 F6000'];
+  const heat = isCold ? [] : ['M140 S60', 'M104 S200'];
+  const start = [...heat, 'G28', 'G4 P8000', 'G1 X50 Y50 Z5 F6000'];
   return [...start, ...moves, 'M104 S0', 'M140 S0', ''].join('\n');
 }

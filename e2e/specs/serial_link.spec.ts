@@ -1,5 +1,6 @@
 // A port that is not given, not there, not free, or goes away: what the page says, and what the printer does meanwhile.
 import { expect, measured, type SerialPanel, test } from '../fixtures/serial.ts';
+import { clickedAt, stampClick, stopped } from '../fixtures/stops.ts';
 import type { DeviceBridge } from '../serial/bridge.ts';
 import { strolling } from '../serial/gcode.ts';
 import type { BridgePort } from '../serial/port.ts';
@@ -177,7 +178,7 @@ test('a second tab is refused the printer, and the first prints on', async ({ br
   await second.connectOffered();
   await expect(second.alert).toContainText('Another tab of this browser is connected to this printer.');
   await expect(second.alert).toContainText('Go on in that tab, or disconnect there first.');
-  await expect(second.status).toContainText('Not connected');
+  await expect(second.status).toContainText('Viewer: printing');
   const before = pulses(printer)[0] ?? 0;
   await expect.poll(() => pulses(printer)[0]).toBeGreaterThan(before + 8000);
   await expect(first.status).toContainText('Printing');
@@ -225,22 +226,10 @@ test('the emergency stop reaches the board at once', async ({ bridge, open }) =>
   port.goOnInRealTime();
   await panel.send('M104 S200');
   await expect.poll(() => Math.max(...duties(printer))).toBeGreaterThan(0);
-  await panel.page.evaluate(() => {
-    const stamp = (event: Event) => {
-      document.documentElement.dataset['clickedAt'] = String(performance.timeOrigin + event.timeStamp);
-    };
-    document.addEventListener('click', stamp, { capture: true, once: true });
-  });
-  const stopped = new Promise<number>((resolve) => {
-    port.onToDevice = () => {
-      // The bytes are in the device's UART now: what they order is done within its next millisecond.
-      const at = performance.timeOrigin + performance.now();
-      setTimeout(() => printer.state().shutdown !== null && resolve(at), 10);
-    };
-  });
+  await stampClick(panel.page);
+  const stop = stopped(port, printer);
   await panel.emergencyStop.click();
-  const clickedAt = Number(await panel.page.locator('html').getAttribute('data-clicked-at'));
-  const tookMs = (await stopped) - clickedAt;
+  const tookMs = (await stop).atMs - (await clickedAt(panel.page));
   measured(`click to bytes: ${tookMs.toFixed(1)} ms`);
   expect(tookMs).toBeGreaterThan(0);
   expect(tookMs).toBeLessThan(STOP_MS_MAX);

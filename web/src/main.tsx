@@ -14,14 +14,18 @@ import { startMachine } from './state/machine';
 import { startPreview } from './state/preview';
 import { followPrint } from './state/print';
 import { loadProfiles } from './state/profiles';
+import { followPort } from './state/reconnect';
 import { applySettings } from './state/settings';
+import { startWatching } from './state/watched';
 
 applySettings();
 const root = document.getElementById('app');
 if (root) render(<App />, root);
 startMachine();
 startPreview();
+startWatching();
 followTemperatures();
 guardPrint();
+followPort();
 followPrint();
 void loadProfiles().then(followProfile);

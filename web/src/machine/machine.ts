@@ -2,9 +2,10 @@
 //
 // The loops (realtime.ts, lockstep.ts) give it bytes and time; it gives them bytes and the next wake-up. Knows neither
 // clocks nor ports.
+import type { LineErrors } from '../transport/transport';
 import { type Seconds, seconds } from '../units';
 import { Feeder } from './feeder';
-import type { ConfirmedLines, FromMachine, MachineEvent, Trouble, WakeUps, Wish } from './protocol';
+import type { ConfirmedLines, FromMachine, MachineEvent, Snapshot, Trouble, WakeUps, Wish } from './protocol';
 import type { Session } from './session';
 import { fileBrokeOff, fileUnreadable, stopNotSent } from './troubles';
 
@@ -20,7 +21,7 @@ const SPEED_AHEAD = seconds(5);
 export class Machine {
   readonly session: Session;
   readonly #tell: (message: FromMachine) => void;
-  readonly #lineErrors: () => number;
+  readonly #lineErrors: () => LineErrors;
   #feeder: Feeder | undefined;
   #starting = false;
   /** The file of the job that waits broke off: it cannot go on. */
@@ -34,7 +35,7 @@ export class Machine {
   /** Whether the planned speed is told. */
   watchesSpeed = false;
 
-  constructor(session: Session, tell: (message: FromMachine) => void, lineErrors: () => number) {
+  constructor(session: Session, tell: (message: FromMachine) => void, lineErrors: () => LineErrors) {
     this.session = session;
     this.#tell = tell;
     this.#lineErrors = lineErrors;
@@ -53,7 +54,7 @@ export class Machine {
     return bytes;
   }
 
-  /** A timer came this much later than it was asked for. */
+  /** It is this much later than it should be: the computer slept, or was very busy. */
   woke(late: Seconds): void {
     const { missed, latest } = this.#wakeUps;
     const isMissed = late > MISSED_MIN;
@@ -112,13 +113,19 @@ export class Machine {
     this.#dropped = 0;
     if (this.#events.length > 0) this.#tell({ kind: 'events', events: this.#events });
     this.#events = [];
-    const snapshot = this.session.snapshot(now);
+    const snapshot = this.look(now);
     // A job that ended in an error has no event of its own.
     if (snapshot.job === 'none') this.dropJob();
-    const link = snapshot.link && { ...snapshot.link, lineErrors: this.#lineErrors() };
-    this.#tell({ kind: 'snapshot', snapshot: { ...snapshot, link, wakeUps: this.#wakeUps } });
+    this.#tell({ kind: 'snapshot', snapshot });
     if (!this.watchesSpeed) return;
     this.#tell({ kind: 'planned-speed', pairs: this.session.plannedSpeed(now, SPEED_BEHIND, SPEED_AHEAD) });
+  }
+
+  /** How things are. */
+  look(now: Seconds): Snapshot {
+    const snapshot = this.session.snapshot(now);
+    const link = snapshot.link && { ...snapshot.link, lineErrors: this.#lineErrors() };
+    return { ...snapshot, link, wakeUps: this.#wakeUps };
   }
 
   wish(wish: Wish, now: Seconds): Trouble | null {

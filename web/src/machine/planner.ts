@@ -7,6 +7,7 @@ import type { UiRequest } from '../bindings/UiRequest';
 import type { VirtualState } from '../bindings/VirtualState';
 import initialise, { PrinterSession, VirtualPrinter } from '../bindings/wasm/planner_wasm.js';
 import { inWords, plannerTrouble } from '../planner_error';
+import { NO_LINE_ERRORS } from '../transport/transport';
 import { celsius, mm, type Seconds, seconds, share } from '../units';
 import type { Axis, ConfirmedLines, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
 import type { Session, SessionSnapshot, SimulatedPrinter } from './session';
@@ -145,7 +146,7 @@ function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
       bytesRetransmitted: Number(link.retransmitted_bytes),
       timeouts: Number(link.timeouts),
       roundTrip: link.round_trip_s === null ? null : seconds(link.round_trip_s),
-      lineErrors: 0,
+      lineErrors: NO_LINE_ERRORS,
     },
   };
 }

@@ -2,6 +2,7 @@
 // Shapes only. Values that come from the planner are described here in the page's own words; machine/planner.ts
 // makes them from the planner's.
 import type { VirtualState } from '../bindings/VirtualState';
+import type { LineErrors } from '../transport/transport';
 import type { PortId } from '../transport/web_serial';
 import type { Celsius, Mm, Seconds, Share } from '../units';
 
@@ -43,7 +44,7 @@ export interface LinkCounts {
   readonly bytesRetransmitted: number;
   readonly timeouts: number;
   readonly roundTrip: Seconds | null;
-  readonly lineErrors: number;
+  readonly lineErrors: LineErrors;
 }
 
 /** How late the worker's timers were since the connection began. */
@@ -107,11 +108,27 @@ export type PortChoice =
       readonly faults: string;
     };
 
+/** What there is to say of a print's file. */
+export interface PrintFacts {
+  readonly name: string;
+  /** From the plan; null where that is not known. */
+  readonly time: Seconds | null;
+  readonly lines: number;
+}
+
 /** Lines that the user wants left out; all that are not known, where there are more than can be listed. */
 export type ConfirmedLines = readonly number[] | 'all';
 
 export type ToMachine =
-  | { readonly kind: 'connect'; readonly port: PortChoice; readonly config: string }
+  | {
+      readonly kind: 'connect';
+      readonly port: PortChoice;
+      readonly config: string;
+      /** Of this one connection, among all tabs. */
+      readonly id: string;
+      /** What the user calls the machine. */
+      readonly name: string;
+    }
   | { readonly kind: 'disconnect' }
   | { readonly kind: 'wish'; readonly id: number; readonly wish: Wish }
   | {
@@ -119,6 +136,7 @@ export type ToMachine =
       readonly id: number;
       readonly file: Blob;
       readonly confirmedLines: ConfirmedLines;
+      readonly facts: PrintFacts;
     }
   | { readonly kind: 'speed'; readonly speed: number }
   /** A snapshot has arrived: the next may be sent. */

@@ -66,6 +66,17 @@ export const portInUse = (): Trouble =>
     'Go on in that tab, or disconnect there first.',
   );
 
+/** The tab that drove a machine is gone without a word: closed, reloaded, or crashed. */
+export const driverGone = (name: string, port: 'serial' | 'virtual', wasPrinting: boolean): Trouble =>
+  trouble(
+    'driver-gone',
+    `The tab that drove ${name} is gone${wasPrinting ? ' in the middle of a print' : ''}.`,
+    port === 'serial' ? ON_ITS_OWN : 'The virtual printer was a part of that tab and is gone with it.',
+    port === 'serial'
+      ? 'Look at the printer first. This tab can take it over: connect here. A print does not start again by itself.'
+      : 'Connect a virtual printer here to begin anew.',
+  );
+
 /** A file that is not being printed. */
 export const fileUnreadable = (error: unknown): Trouble =>
   trouble(

@@ -3,14 +3,15 @@
 // Nothing here waits for the page. A Web Lock is held from before the port is opened to after it is closed, so that
 // one tab has a printer; a tab that holds a lock is not frozen either.
 import { ANSWER_BYTES_MAX, classify } from '../transport/answer';
-import { PortError } from '../transport/transport';
+import { NO_LINE_ERRORS, PortError } from '../transport/transport';
 import { find, openSerial } from '../transport/web_serial';
 import { type Seconds, seconds } from '../units';
+import { Broadcast } from './broadcast';
 import { Connection, Died, type Parts } from './connection';
 import { LockstepLoop } from './lockstep';
 import { Machine } from './machine';
 import { loadPlanner, type Planner } from './planner';
-import type { FromMachine, PortChoice, ToMachine, Trouble, Wish } from './protocol';
+import type { FromMachine, PortChoice, Snapshot, ToMachine, Trouble, Wish } from './protocol';
 import { RealTimeLoop } from './realtime';
 import { answerTrouble, plannerMissing, portInUse, portTrouble, stopNotSent } from './troubles';
 
@@ -22,13 +23,19 @@ const realNow = (): Seconds => seconds(performance.now() / 1000);
 
 let planner: Planner | undefined;
 let connection: Connection | undefined;
+/** Tells other tabs of the connection. */
+let broadcast: Broadcast | undefined;
 /** From before the port is opened until after it is closed. */
 let opening: { cancelled: boolean } | undefined;
 /** Whether the page shows the planned speed; outlives connections. */
 let watchesSpeed = false;
 
-const tell = (message: FromMachine): void =>
+type Connect = ToMachine & { kind: 'connect' };
+
+function tell(message: FromMachine): void {
+  broadcast?.note(message);
   scope.postMessage(message, message.kind === 'planned-speed' ? [message.pairs.buffer] : []);
+}
 
 /** What the port's board said before it was identified, to judge what it is. */
 class FirstBytes {
@@ -55,13 +62,42 @@ async function withLock(name: string, body: () => Promise<Trouble | null>): Prom
   return await navigator.locks.request(name, { ifAvailable: true }, (lock) => (lock ? body() : portInUse()));
 }
 
+/** Tells other tabs of a connection, and stops its machine for them. */
+function broadcastOf({ id, name, port }: Connect, current: Connection): Broadcast {
+  return new Broadcast({
+    id,
+    name,
+    port,
+    look: () => {
+      let seen: Snapshot | null = null;
+      current.attempt(({ machine, now }) => {
+        seen = machine.look(now());
+      });
+      return seen;
+    },
+    stop: () => {
+      let trouble: Trouble | null = stopNotSent('not-open');
+      current.attempt(({ machine, now, tick }) => {
+        trouble = machine.wish({ kind: 'emergency-stop' }, now());
+        tick();
+      });
+      return trouble;
+    },
+  });
+}
+
 /** Goes on until the connection is over; returns why it is. */
-async function hold(parts: Parts): Promise<Trouble | null> {
+async function hold(message: Connect, parts: Parts): Promise<Trouble | null> {
   parts.machine.watchesSpeed = watchesSpeed;
   connection = new Connection(parts, tell);
+  broadcast = broadcastOf(message, connection);
+  let trouble: Trouble | null = null;
   try {
-    return await connection.run();
+    trouble = await connection.run();
+    return trouble;
   } finally {
+    broadcast.end(trouble);
+    broadcast = undefined;
     connection = undefined;
   }
 }
@@ -69,14 +105,14 @@ async function hold(parts: Parts): Promise<Trouble | null> {
 async function connectSerial(
   loaded: Planner,
   choice: PortChoice & { kind: 'serial' },
-  config: string,
+  message: Connect,
 ): Promise<Trouble | null> {
   const port = find(choice.id, await navigator.serial.getPorts());
   if (!port) throw new PortError('port-gone');
   const name = `stepcast-port:${choice.id.vendor}:${choice.id.product}:${choice.id.index}`;
   return await withLock(name, async () => {
     // Before the port is touched: the machine's file may have errors.
-    const session = loaded.openSession(config, realNow());
+    const session = loaded.openSession(message.config, realNow());
     const transport = await openSerial(port, choice.baud).catch((error: unknown) => {
       session.free();
       throw error;
@@ -97,7 +133,7 @@ async function connectSerial(
       now: realNow,
       onBytes: (bytes) => first.take(bytes),
     });
-    return await hold({
+    return await hold(message, {
       machine,
       now: realNow,
       tick: loop.tick,
@@ -113,17 +149,18 @@ async function connectSerial(
 async function connectVirtual(
   loaded: Planner,
   choice: PortChoice & { kind: 'virtual' },
-  config: string,
+  message: Connect,
 ): Promise<Trouble | null> {
+  const { config } = message;
   // Every tab has a printer of its own; the lock only keeps the tab from being frozen.
   return await withLock(`stepcast-virtual:${crypto.randomUUID()}`, async () => {
     if (opening?.cancelled) return null;
     const printer = loaded.powerUp(config, choice.board, choice.seed, choice.faults);
     const now = (): Seconds => printer.now();
     const session = loaded.openVirtualSession(config, choice.board, now());
-    const machine = new Machine(session, tell, () => 0);
+    const machine = new Machine(session, tell, () => NO_LINE_ERRORS);
     const loop = new LockstepLoop(machine, printer, choice.speed, realNow);
-    return await hold({
+    return await hold(message, {
       machine,
       now,
       tick: loop.tick,
@@ -136,7 +173,7 @@ async function connectVirtual(
   });
 }
 
-async function connect(message: ToMachine & { kind: 'connect' }): Promise<void> {
+async function connect(message: Connect): Promise<void> {
   if (connection || opening) return;
   opening = { cancelled: false };
   try {
@@ -159,12 +196,12 @@ function uncaught(error: unknown): void {
 }
 
 /** A connection from its beginning to its end; why it ended. Rejects where the planner cannot be relied on any more. */
-async function carryOut(message: ToMachine & { kind: 'connect' }): Promise<Trouble | null> {
+async function carryOut(message: Connect): Promise<Trouble | null> {
   try {
     const loaded = await load();
     return message.port.kind === 'serial'
-      ? await connectSerial(loaded, message.port, message.config)
-      : await connectVirtual(loaded, message.port, message.config);
+      ? await connectSerial(loaded, message.port, message)
+      : await connectVirtual(loaded, message.port, message);
   } catch (error) {
     if (error instanceof Died || error instanceof WebAssembly.RuntimeError) throw error;
     return planner ? (planner.asTrouble(error) ?? portTrouble(error)) : plannerMissing(error);
@@ -190,12 +227,14 @@ function wish(id: number, wanted: Wish): void {
   tell({ kind: 'answer', id, trouble: isStop ? stopNotSent('not-open') : null });
 }
 
-async function print({ id, file, confirmedLines }: ToMachine & { kind: 'print' }): Promise<void> {
+async function print({ id, file, confirmedLines, facts }: ToMachine & { kind: 'print' }): Promise<void> {
   const current = connection;
   const parts = current?.parts;
   if (!current || !parts) return tell({ kind: 'answer', id, trouble: null });
   try {
-    tell({ kind: 'answer', id, trouble: await parts.machine.print(file, confirmedLines, parts.now) });
+    const trouble = await parts.machine.print(file, confirmedLines, parts.now);
+    if (trouble === null) broadcast?.begins(facts);
+    tell({ kind: 'answer', id, trouble });
   } catch (error) {
     current.fail(error);
   }

@@ -6,10 +6,11 @@ import { connect, plannerFailed, plannerLoaded, refusePort } from '../state/mach
 import { activeProfile, profiles, SHIPPED } from '../state/profiles';
 import { change, settings } from '../state/settings';
 import { identify, type PortId } from '../transport/web_serial';
+import { openDialog } from './dialogs';
+import { PanelDialog } from './emergency';
 import { faultProblem } from './faults';
 import { machineSummary } from './machine_summary';
-import { Button, Choice, Dialog, NumberField } from './parts';
-import { openDialog } from './top_bar';
+import { Button, Choice, NumberField } from './parts';
 import { VirtualSpeed } from './virtual_speed';
 
 const HAS_SERIAL = 'serial' in navigator;
@@ -88,14 +89,14 @@ async function choose(): Promise<void> {
 
 async function go(): Promise<void> {
   const { connectTo, baud, speed } = settings.value;
-  const { config } = activeProfile.value;
+  const profile = activeProfile.value;
   if (connectTo === 'virtual' || !HAS_SERIAL) {
-    connect({ kind: 'virtual', board: 'rp2040', speed, seed: 1, faults: faults.value.trim() }, config);
+    connect({ kind: 'virtual', board: 'rp2040', speed, seed: 1, faults: faults.value.trim() }, profile);
   } else {
     // The worker finds the port by its place among those of its kind: that has to be its place now.
     await look();
     if (!chosen.value || openDialog.value !== 'connect') return;
-    connect({ kind: 'serial', id: identify(chosen.value, known.value), baud }, config);
+    connect({ kind: 'serial', id: identify(chosen.value, known.value), baud }, profile);
   }
   openDialog.value = null;
 }
@@ -202,7 +203,7 @@ export function ConnectDialog(): JSX.Element {
     return HAS_SERIAL ? followPorts() : undefined;
   }, []);
   return (
-    <Dialog title="Connect" onClose={() => (openDialog.value = null)}>
+    <PanelDialog title="Connect" onClose={() => (openDialog.value = null)}>
       <form
         class="stack"
         onSubmit={(event) => {
@@ -254,6 +255,6 @@ export function ConnectDialog(): JSX.Element {
           </button>
         </div>
       </form>
-    </Dialog>
+    </PanelDialog>
   );
 }

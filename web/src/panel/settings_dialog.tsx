@@ -1,10 +1,10 @@
 // Settings: theme, presets for materials, the diagnostic report.
 import type { JSX } from 'preact';
 import { change, PRESETS_MAX, type Preset, settings, type Theme } from '../state/settings';
+import { openDialog } from './dialogs';
 import { PanelDialog } from './emergency';
 import { Button, Choice, download, NumberField } from './parts';
 import { diagnosticReport } from './report';
-import { openDialog } from './top_bar';
 
 const NOZZLE_MAX_C = 500;
 const BED_MAX_C = 200;

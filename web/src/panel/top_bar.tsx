@@ -1,15 +1,16 @@
 // The bar at the top: what is connected, the dialogs' buttons, and the emergency stop, apart from everything else.
-import { computed, signal } from '@preact/signals';
+import { computed } from '@preact/signals';
 import type { JSX } from 'preact';
+import type { JobStatus, Phase, PortChoice } from '../machine/protocol';
 import { connection, disconnect, isPrinting, isStale, job, port, snapshot } from '../state/machine';
 import { activeProfile } from '../state/profiles';
+import { isViewing, watched } from '../state/watched';
+import { openDialog } from './dialogs';
 import { EmergencyStop } from './emergency';
 import { Button } from './parts';
 import { ask } from './question';
 
-export const openDialog = signal<'connect' | 'settings' | 'machine' | null>(null);
-
-interface Status {
+export interface Status {
   readonly text: string;
   readonly tone: 'off' | 'busy' | 'good' | 'bad';
 }
@@ -23,14 +24,25 @@ const JOBS = {
   held: 'Held',
 } as const;
 
+/** How a machine is, in a word or two. */
+export function statusOf(phase: Phase, job: JobStatus): Status {
+  if (phase === 'ready') return { text: JOBS[job], tone: 'good' };
+  if (phase === 'shutdown') return { text: 'Stopped', tone: 'bad' };
+  return phase === 'failed' ? { text: 'Failed', tone: 'bad' } : { text: 'Connecting', tone: 'busy' };
+}
+
 const status = computed<Status>(() => {
+  const [other] = watched.value;
+  if (other) {
+    if (other.isStale) return { text: 'Viewer: not responding', tone: 'bad' };
+    const { text, tone } = statusOf(other.view.snapshot.phase, other.view.snapshot.job);
+    return { text: `Viewer: ${text.toLowerCase()}`, tone };
+  }
   if (connection.value === 'closed') return { text: 'Not connected', tone: 'off' };
   if (isStale.value) return { text: 'Not responding', tone: 'bad' };
   const phase = snapshot.value?.phase;
   if (connection.value === 'opening' || phase === undefined) return { text: 'Connecting', tone: 'busy' };
-  if (phase === 'ready') return { text: JOBS[job.value], tone: 'good' };
-  if (phase === 'shutdown') return { text: 'Stopped', tone: 'bad' };
-  return phase === 'failed' ? { text: 'Failed', tone: 'bad' } : { text: 'Connecting', tone: 'busy' };
+  return statusOf(phase, job.value);
 });
 
 function end(): void {
@@ -44,9 +56,14 @@ function end(): void {
   });
 }
 
+const nameOf = (choice: PortChoice | null, profile: string): string =>
+  choice?.kind === 'virtual' ? 'Virtual printer' : profile;
+
 export function TopBar(): JSX.Element {
   const isClosed = connection.value === 'closed';
-  const where = port.value?.kind === 'virtual' ? 'Virtual printer' : activeProfile.value.name;
+  const where = isViewing.value
+    ? watched.value.map(({ view }) => nameOf(view.port, view.name)).join(', ')
+    : nameOf(port.value, activeProfile.value.name);
   return (
     <header class="top-bar">
       <h1 class="brand">
@@ -56,7 +73,7 @@ export function TopBar(): JSX.Element {
       <p class={`status ${status.value.tone}`} role="status">
         <span class="dot" aria-hidden="true" />
         <span>{status.value.text}</span>
-        {!isClosed && <span class="status-where">{where}</span>}
+        {(!isClosed || isViewing.value) && <span class="status-where">{where}</span>}
       </p>
       <nav class="top-actions" aria-label="Page">
         {isClosed ? (

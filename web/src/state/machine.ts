@@ -7,13 +7,17 @@ import type {
   FromMachine,
   MachineEvent,
   PortChoice,
+  PrintFacts,
   Snapshot,
   ToMachine,
   Trouble,
   Wish,
 } from '../machine/protocol';
 import { plannerMissing, portTrouble, stopNotSent, workerDied } from '../machine/troubles';
+import { stalled } from './incidents';
+import { forgetLineErrors, noteLineErrors } from './line_errors';
 import { note } from './log';
+import type { Profile } from './profiles';
 
 export type ConnectionState = 'closed' | 'opening' | 'open';
 
@@ -57,6 +61,8 @@ let deaths = 0;
 let lastId = 0;
 /** A print was begun since the last snapshot. */
 let isBegun = false;
+/** Why motion was held last. */
+let heldFor: Trouble | null = null;
 let newsTimer: ReturnType<typeof setTimeout> | undefined;
 const waiting = new Map<number, (answer: Answer) => void>();
 
@@ -117,7 +123,8 @@ function closed(reason: Trouble | null): void {
   if (wasOpen) note('info', 'Disconnected.');
 }
 
-function report(reason: Trouble): void {
+/** Tells the user. */
+export function report(reason: Trouble): void {
   trouble.value = reason;
   note('error', reason.happened);
 }
@@ -129,6 +136,7 @@ function take(message: FromMachine): void {
       break;
     case 'opened':
       connection.value = 'open';
+      forgetLineErrors();
       deaths = 0;
       news();
       trouble.value = null;
@@ -160,12 +168,13 @@ function take(message: FromMachine): void {
       break;
     }
     case 'gap':
-      note('warning', `The computer was held up for ${message.seconds.toFixed(1)} s.`);
+      stalled(message.seconds, isPrinting.value);
       break;
   }
 }
 
 function look(now: Snapshot): void {
+  if (now.link) noteLineErrors(now.link.lineErrors);
   const wasPrinting = isPrinting.value;
   snapshot.value = now;
   news();
@@ -211,6 +220,8 @@ function happened(event: MachineEvent): void {
       note('info', 'Paused.');
       break;
     case 'resumed':
+      // What was held goes on: why it was does not stand any more.
+      if (trouble.value === heldFor) trouble.value = null;
       note('info', 'The print goes on.');
       break;
     case 'done':
@@ -218,10 +229,14 @@ function happened(event: MachineEvent): void {
       note('info', 'The print is done.');
       break;
     case 'cancelled':
+      if (trouble.value === heldFor) trouble.value = null;
       outcome.value = 'cancelled';
       note('info', 'The print was cancelled.');
       break;
     case 'held':
+      heldFor = event.trouble;
+      report(event.trouble);
+      break;
     case 'trouble':
       report(event.trouble);
       break;
@@ -231,13 +246,18 @@ function happened(event: MachineEvent): void {
   }
 }
 
-export function connect(choice: PortChoice, config: string): void {
+/** Of this tab's connection, the present or the last one. */
+export const connectionId = signal('');
+
+/** `name` is what the user calls the machine, `config` its file. */
+export function connect(choice: PortChoice, { name, config }: Pick<Profile, 'name' | 'config'>): void {
   if (connection.value !== 'closed') return;
   connection.value = 'opening';
+  connectionId.value = crypto.randomUUID();
   port.value = choice;
   virtualRecord.value = null;
   trouble.value = null;
-  send({ kind: 'connect', port: choice, config });
+  send({ kind: 'connect', port: choice, config, id: connectionId.value, name });
 }
 
 /** Whether `plannedSpeed` is wanted. */
@@ -272,9 +292,9 @@ export async function wish(wanted: Wish): Promise<boolean> {
   return isDone(await ask((id) => ({ kind: 'wish', id, wish: wanted })));
 }
 
-export async function print(file: Blob, confirmedLines: ConfirmedLines): Promise<boolean> {
+export async function print(file: Blob, facts: PrintFacts, confirmedLines: ConfirmedLines): Promise<boolean> {
   outcome.value = null;
-  isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, confirmedLines })));
+  isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, facts, confirmedLines })));
   return isBegun;
 }
 

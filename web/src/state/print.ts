@@ -47,7 +47,8 @@ export async function printShown(): Promise<void> {
   if (!open || !found) return;
   const before = printed.value;
   printed.value = { file: open, summary: found, marks: lineMarks() };
-  if (!(await print(open.blob, consent.value))) printed.value = before;
+  const facts = { name: open.name, time: found.time, lines: found.lines };
+  if (!(await print(open.blob, facts, consent.value))) printed.value = before;
 }
 
 /** The layer in which a vertex lies, counted from 1; 0 before the first. */

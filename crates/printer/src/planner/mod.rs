@@ -173,12 +173,6 @@ impl Planner {
         source.e_offset = e - source.interpreter.position().e;
     }
 
-    /// Makes a source that was interrupted go on: the machine is where it was then, but for the extruder, which has been
-    /// moved by this much filament in mm.
-    pub fn rejoin(&mut self, source: &mut Source, filament_mm: f64) {
-        source.e_offset += filament_mm;
-    }
-
     /// As [`Self::adopt`], for a job, whose plan is to depend on nothing that was done before: the machine file's limits
     /// hold again, and the filament counts from 0. At rest.
     pub fn begin_job(&mut self, source: &mut Source) {

@@ -7,7 +7,7 @@ use units::{MmPerS, Seconds};
 
 use crate::{
     error::PrinterError,
-    planner::{Position, Source},
+    planner::{Planner, Position, Source},
 };
 
 /// Going back to where a print was paused is done at this speed.
@@ -31,6 +31,8 @@ pub(super) enum JobState {
     /// Coming to rest; then it waits.
     Pausing,
     Paused,
+    /// Going back to where it was paused.
+    Returning,
     /// Coming to rest; then it is over because the user said so …
     Cancelling,
     /// … or because of this.
@@ -55,9 +57,11 @@ pub enum JobStatus {
     Held,
 }
 
-/// How the machine stood when a job was paused.
-#[derive(Clone, Copy, Debug)]
+/// A job that was paused, and how the machine stood then.
+#[derive(Debug)]
 pub(super) struct Paused {
+    /// Plans the job and nothing else, so that its plan does not depend on what is done meanwhile.
+    pub(super) planner: Box<Planner>,
     pub(super) position: Position,
     pub(super) homed: [bool; 3],
     /// The nozzle was hot enough.
@@ -93,7 +97,7 @@ impl Job {
 
     pub(super) const fn status(&self) -> JobStatus {
         match self.state {
-            JobState::Printing => JobStatus::Printing,
+            JobState::Printing | JobState::Returning => JobStatus::Printing,
             JobState::Pausing => JobStatus::Pausing,
             JobState::Paused => JobStatus::Paused,
             JobState::Cancelling | JobState::Failing(_) => JobStatus::Ending,

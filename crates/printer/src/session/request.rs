@@ -46,7 +46,7 @@ impl Session {
                 ready.sources().for_each(|source| source.interpreter.set_flow_factor(factor));
             }
             Request::Pause => ready.pause(now)?,
-            Request::Resume => ready.resume(now)?,
+            Request::Resume => ready.resume()?,
             Request::Cancel => ready.cancel(now)?,
             Request::EmergencyStop | Request::FirmwareRestart => {}
         }

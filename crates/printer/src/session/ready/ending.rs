@@ -5,7 +5,7 @@ use units::Seconds;
 use super::{Held, Ready, Wait};
 use crate::{
     error::{Ended, ErrorCode, PrinterError},
-    planner::ExtrusionPermit,
+    planner::{ExtrusionPermit, Planner, Position},
     session::{
         event::Event,
         job::{Job, JobState, JobStatus, Paused, RETURN_FEED},
@@ -82,47 +82,43 @@ impl Ready {
     }
 
     /// Goes on with what is held; else goes back to where the job was paused, and on.
-    pub(in crate::session) fn resume(&mut self, now: Seconds) -> Result<(), PrinterError> {
+    pub(in crate::session) fn resume(&mut self) -> Result<(), PrinterError> {
         if self.resume_held()? {
             return Ok(());
         }
-        let Some(paused) = self.job.as_ref().and_then(|job| job.paused) else {
+        let paused = self.job.as_ref().filter(|job| job.state == JobState::Paused);
+        let Some(paused) = paused.and_then(|job| job.paused.as_ref()) else {
             return Err(PrinterError::new(ErrorCode::NoJob, "no job is paused"));
         };
+        let Paused { position, homed: was_homed, could_extrude, .. } = *paused;
         if self.is_console_busy() {
             return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
         }
         let homed = self.planner.guard.homed();
-        if (0..3).any(|axis| paused.homed[axis] && !homed[axis]) {
+        if (0..3).any(|axis| was_homed[axis] && !homed[axis]) {
             return Err(PrinterError::new(
                 ErrorCode::NotHomed,
                 "the position was lost while the job was paused",
             ));
         }
-        if let (true, ExtrusionPermit::TooCold { celsius }) = (paused.could_extrude, self.extrusion_permit())
-        {
+        if let (true, ExtrusionPermit::TooCold { celsius }) = (could_extrude, self.extrusion_permit()) {
             let detail = format!("the nozzle has cooled to {celsius:.0} °C while the job was paused");
             return Err(PrinterError::new(ErrorCode::ColdExtrusion, detail));
         }
-        self.go_back(&paused)?;
-        let Some(job) = &mut self.job else { return Err(ErrorCode::NoJob.into()) };
-        let filament_mm = self.planner.position()[3] - paused.position[3];
-        self.planner.rejoin(&mut job.source, filament_mm);
-        job.state = JobState::Printing;
-        job.paused = None;
-        let Held { wait, barrier } = core::mem::take(&mut self.held);
-        self.wait = wait.go_on(now);
-        self.planner.put_barrier(barrier);
+        self.go_back(position, was_homed)?;
+        if let Some(job) = &mut self.job {
+            job.state = JobState::Returning;
+        }
         self.events.push(Event::Resumed);
         Ok(())
     }
 
     /// Across first, at the greater height, then down: nothing is hit on the way. The filament stays as it is, and so
     /// does an axis whose position was not known then.
-    fn go_back(&mut self, paused: &Paused) -> Result<(), PrinterError> {
+    fn go_back(&mut self, position: Position, was_homed: [bool; 3]) -> Result<(), PrinterError> {
         let here = self.planner.position();
         let [x, y, z] =
-            core::array::from_fn(|axis| if paused.homed[axis] { paused.position[axis] } else { here[axis] });
+            core::array::from_fn(|axis| if was_homed[axis] { position[axis] } else { here[axis] });
         let (up, e) = (here[2].max(z), here[3]);
         for to in [[here[0], here[1], up, e], [x, y, up, e], [x, y, z, e]] {
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
@@ -143,6 +139,7 @@ impl Ready {
         let state = self.job.as_ref().map(|job| job.state.clone());
         match state {
             Some(JobState::Pausing) => self.is_paused(now),
+            Some(JobState::Returning) => self.has_returned(now),
             Some(JobState::Cancelling) => self.end_job(Event::JobCancelled, now),
             Some(JobState::Failing(error)) => self.end_job(Event::Error(error), now),
             Some(JobState::Printing) => {}
@@ -150,20 +147,37 @@ impl Ready {
         }
     }
 
+    /// The job's planner is put aside, and another one moves the machine until it is back.
     fn is_paused(&mut self, now: Seconds) {
-        let paused = Paused {
-            position: self.planner.position(),
-            homed: self.planner.guard.homed(),
-            could_extrude: self.extrusion_permit() == ExtrusionPermit::Allowed,
+        let (position, homed) = (self.planner.position(), self.planner.guard.homed());
+        let mut aside = match Planner::new(&self.config, self.board.clock) {
+            Ok(aside) => aside,
+            Err(error) => return self.source_failed(error, now),
         };
+        aside.stand_at(position);
+        (0..3).for_each(|axis| aside.guard.set_homed(axis, homed[axis]));
+        let could_extrude = self.extrusion_permit() == ExtrusionPermit::Allowed;
+        let planner = Box::new(core::mem::replace(&mut self.planner, aside));
         if let Some(job) = &mut self.job {
             job.state = JobState::Paused;
-            job.paused = Some(paused);
+            job.paused = Some(Paused { planner, position, homed, could_extrude });
         }
         self.last_active = now;
         self.console.clear();
         self.planner.adopt(&mut self.console.source);
         self.events.push(Event::Paused);
+    }
+
+    /// The machine is where the job was paused: its own planner goes on.
+    fn has_returned(&mut self, now: Seconds) {
+        let Some(job) = &mut self.job else { return };
+        if let Some(paused) = job.paused.take() {
+            self.planner = *paused.planner;
+        }
+        job.state = JobState::Printing;
+        let Held { wait, barrier } = core::mem::take(&mut self.held);
+        self.wait = wait.go_on(now);
+        self.planner.put_barrier(barrier);
     }
 
     /// A job that ends early leaves everything off.

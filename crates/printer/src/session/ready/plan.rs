@@ -35,7 +35,10 @@ impl Ready {
                 return Ok(());
             }
             let stopping = self.job.as_ref().is_some_and(|job| {
-                matches!(job.state, JobState::Pausing | JobState::Cancelling | JobState::Failing(_))
+                matches!(
+                    job.state,
+                    JobState::Pausing | JobState::Returning | JobState::Cancelling | JobState::Failing(_)
+                )
             });
             if stopping {
                 self.planner.finish_run();
