@@ -108,7 +108,7 @@ impl<R: Recorder> VirtualPrinter<R> {
 
     fn check_target(&self, kind: &FailureKind) -> Result<(), WiringError> {
         let (name, known) = match kind {
-            FailureKind::Unplug | FailureKind::Replug => return Ok(()),
+            FailureKind::Unplug | FailureKind::Replug | FailureKind::BoardReset => return Ok(()),
             FailureKind::SensorOpen(name)
             | FailureKind::SensorShort(name)
             | FailureKind::HeaterDead(name)
@@ -315,6 +315,7 @@ impl<R: Recorder> VirtualPrinter<R> {
                 self.board.up.clear();
             }
             FailureKind::Replug => self.board.plugged = true,
+            FailureKind::BoardReset => self.board.restart_wanted = true,
             FailureKind::SensorOpen(name) | FailureKind::SensorShort(name) => {
                 let reads = if matches!(kind, FailureKind::SensorOpen(_)) { ADC_MAX } else { 0 };
                 if let Some(index) = heater(name) {

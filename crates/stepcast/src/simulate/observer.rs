@@ -70,14 +70,17 @@ pub(super) struct Observer {
     new_run: Option<Ticks>,
     /// Where the present run began, unless it homes.
     run_start: Option<Ticks>,
+    /// Where the first run began that does not home.
+    pub(super) began: Option<Ticks>,
     /// When anything happened last.
     pub(super) last_change: Ticks,
     messages: u32,
+    quiet: bool,
 }
 
 impl Observer {
-    /// Nothing has happened yet. `reference` is the file, opened a second time.
-    pub(super) fn new(config: &PrinterConfig, reference: Input, start: Ticks) -> Self {
+    /// Nothing has happened yet. `reference` is the file, opened a second time; `quiet` shows none of its texts.
+    pub(super) fn new(config: &PrinterConfig, reference: Input, start: Ticks, quiet: bool) -> Self {
         Self {
             step_distance_mm: printer::machine::step_distances(config).map(|distance| distance.0),
             endstop_mm: config.steppers.each_ref().map(|axis| axis.position_endstop.0),
@@ -97,8 +100,10 @@ impl Observer {
             done: false,
             new_run: None,
             run_start: None,
+            began: None,
             last_change: start,
             messages: 0,
+            quiet,
         }
     }
 
@@ -130,7 +135,7 @@ impl Observer {
             Event::Progress { line, .. } => self.line = line,
             Event::Message(text) => {
                 self.messages += 1;
-                if self.messages <= MESSAGES_MAX {
+                if self.messages <= MESSAGES_MAX && !self.quiet {
                     console::note(&format!("printer: {text}"));
                 }
             }
@@ -172,6 +177,7 @@ impl Observer {
         if let Some(at) = self.new_run.take() {
             tally.digest.expect_run(at, homing);
             self.run_start = (!homing).then_some(at);
+            self.began = self.began.or(self.run_start);
         }
         self.plan_steps(scheduled);
         let mut piece = Piece { line, from, to, bulge_mm: 0.0 };

@@ -296,3 +296,17 @@ proptest! {
         prop_assert!(state.heaters.iter().all(|heater| (0.0..800.0).contains(&heater.temperature.0)));
     }
 }
+
+#[test]
+fn a_board_that_starts_anew_lets_its_pins_go_and_says_so() {
+    let mut host = Host::usual("board-reset@6", ());
+    configure(&mut host);
+    heat(&mut host, 1.0, 5);
+    assert!(host.state().heaters[0].duty > 0.0);
+    host.answers.clear();
+    host.run(2.0);
+    let state = host.state();
+    assert_eq!((state.shutdown, state.heaters[0].duty), (None, 0.0));
+    let says = |answer: &Answer| Response::decode(&mut &answer.payload[..]);
+    assert!(host.answers.iter().any(|answer| says(answer) == Ok(Response::Starting {})));
+}
