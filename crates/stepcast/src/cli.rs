@@ -164,6 +164,9 @@ pub(crate) struct CampaignArgs {
     /// Write the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
+    /// Write the G-code of prints that break a promise into this folder, by their seed
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) save: Option<PathBuf>,
     /// How many prints run at the same time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     pub(crate) jobs: u16,

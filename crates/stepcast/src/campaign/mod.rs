@@ -13,6 +13,8 @@ mod window;
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt::Write as _,
+    fs,
+    path::PathBuf,
     process::ExitCode,
     sync::{
         Mutex, PoisonError,
@@ -67,6 +69,7 @@ struct Campaign {
     config: PrinterConfig,
     sources: Vec<Source>,
     scenarios: Vec<Scenario>,
+    save: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -149,7 +152,7 @@ impl Campaign {
         let wanted: BTreeSet<Scenario> = args.scenarios.iter().copied().collect();
         let all = Scenario::value_variants().iter().copied();
         let scenarios = all.filter(|scenario| wanted.is_empty() || wanted.contains(scenario)).collect();
-        Ok(Self { config, sources, scenarios })
+        Ok(Self { config, sources, scenarios, save: args.save.clone() })
     }
 
     /// One window, clean and with each scenario's fault.
@@ -172,6 +175,11 @@ impl Campaign {
             let case = scenario.case(board, &window, times, &mut chance);
             let print = self.print(&window, &case, seed, WATCHED)?;
             let finding = judge(&case, clean, &print, self.config.printer.heater_max_duration);
+            if let Some(folder) = self.save.as_ref().filter(|_| !finding.broken.is_empty()) {
+                let path = folder.join(format!("{seed}.gcode"));
+                fs::write(&path, &window.gcode)
+                    .with_context(|| format!("cannot write {}", path.display()))?;
+            }
             self.add(scenario, &finding, classes, |what| Broken {
                 seed,
                 board: board_name(&case.board),
