@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use printer::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
+    journal::{Journal, JournalError},
     session::{Event, JobOptions, JobStatus, PhaseName, ScheduledMove, Session},
 };
 use units::{Seconds, Ticks};
@@ -121,6 +122,25 @@ impl Host {
     /// The job's file has ended.
     pub fn job_end(&mut self) {
         self.session.job_end();
+    }
+
+    /// What is to be added to the present print's journal.
+    pub fn take_journal(&mut self) -> String {
+        self.session.take_journal()
+    }
+
+    /// The number under which the board holds a print whose host is gone.
+    pub fn held_print(&self) -> Option<u32> {
+        self.session.held_print()
+    }
+
+    /// Takes up the print that the board holds; its file is then fed from the beginning.
+    pub fn take_up(&mut self, journal: &[u8]) -> Result<(), PrinterError> {
+        let refused =
+            |error: JournalError| PrinterError::new(ErrorCode::ContinuationRefused, error.to_string());
+        let journal = Journal::read(journal).map_err(refused)?;
+        self.fed_bytes = 0;
+        self.session.take_up(&journal)
     }
 
     fn sort_events(&mut self) {
@@ -352,6 +372,24 @@ impl PrinterSession {
     /// The job's file has ended.
     pub fn job_end(&mut self) {
         self.host.job_end();
+    }
+
+    /// What is to be added to the present print's journal, where one is kept: text, to be stored before the bytes of the
+    /// last `poll` are sent.
+    pub fn take_journal(&mut self) -> String {
+        self.host.take_journal()
+    }
+
+    /// In the phase `holding`: the number under which the board holds a print (`journal_knows`).
+    pub fn held_print(&self) -> Option<u32> {
+        self.host.held_print()
+    }
+
+    /// In the phase `holding`: takes up the print with its journal. Its file is then fed as far as it is wanted, which
+    /// moves nothing; then the print is held here, until the user resumes or cancels it. What does not fit comes as an
+    /// error, and the board goes on holding.
+    pub fn take_up(&mut self, journal: &[u8]) -> Result<(), JsError> {
+        self.host.take_up(journal).map_err(|error| thrown(&error))
     }
 
     /// Everything that a panel shows: a `Snapshot` as JSON.

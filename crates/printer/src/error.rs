@@ -216,6 +216,12 @@ catalogue! {
     HeldQueueDry, "held-queue-dry":
         "Moves did not reach the printer in time, so the board brought its motion to rest", HELD,
         "Close other heavy programs, connect without a hub. Look at the print, then resume it or cancel it.";
+    HeldForHost, "held-for-host":
+        "The program that was printing went away, and the board holds the print", HELD,
+        "Look at the print, then resume it or cancel it.";
+    ContinuationRefused, "continuation-refused":
+        "The print cannot be taken up with its next step", HELD,
+        "Restart the board, home, and start again from a line or layer of the file.";
     BusyPrinting, "busy-printing":
         "That cannot be done while a print is running", REFUSED,
         "Pause or cancel the print first.";

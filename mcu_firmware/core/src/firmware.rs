@@ -413,6 +413,10 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
                     let _ = self.receiver.send(board, &input.report(oid));
                     input.report_done();
                 }
+                Object::Stepper(stepper) if stepper.report_pending => {
+                    stepper.report_pending = !self.receiver.send(board, &stepper.progress(oid, self.job));
+                    self.reports_pending |= stepper.report_pending;
+                }
                 Object::Trsync(trsync) if trsync.report_pending => {
                     trsync.report_pending = false;
                     let _ = self.receiver.send(board, &trsync.state(oid));

@@ -49,6 +49,8 @@ pub enum PhaseLabel {
     Restarting,
     /// The board's pins are being set up.
     Configuring,
+    /// The board holds a print whose page is gone: it can be taken up with its journal, or the board restarted.
+    Holding,
     /// Ready for commands.
     Ready,
     /// The board has stopped everything and says why; a firmware restart is needed.
@@ -64,6 +66,7 @@ impl From<PhaseName> for PhaseLabel {
             PhaseName::Synchronising => Self::Synchronising,
             PhaseName::Restarting => Self::Restarting,
             PhaseName::Configuring => Self::Configuring,
+            PhaseName::Holding => Self::Holding,
             PhaseName::Ready => Self::Ready,
             PhaseName::Shutdown => Self::Shutdown,
             PhaseName::Failed => Self::Failed,

@@ -139,12 +139,15 @@ pub struct JobRequest {
     pub confirmed_lines: Vec<u32>,
     /// Confirm all of them.
     pub confirm_all: bool,
+    /// The print's own number, with which a journal is kept: any that no other print has.
+    #[serde(default)]
+    pub journal: Option<u32>,
 }
 
 impl From<JobRequest> for JobOptions {
     fn from(request: JobRequest) -> Self {
         let confirmed_lines: BTreeSet<u32> = request.confirmed_lines.into_iter().collect();
-        Self { confirmed_lines, confirm_all: request.confirm_all }
+        Self { confirmed_lines, confirm_all: request.confirm_all, journal: request.journal }
     }
 }
 

@@ -50,6 +50,8 @@ export type ErrorCode =
   | 'board-shutdown'
   | 'held-host-away'
   | 'held-queue-dry'
+  | 'held-for-host'
+  | 'continuation-refused'
   | 'busy-printing'
   | 'no-job'
   | 'not-connected'

@@ -11,4 +11,8 @@ confirmed_lines: Array<number>,
 /**
  * Confirm all of them.
  */
-confirm_all: boolean, };
+confirm_all: boolean, 
+/**
+ * The print's own number, with which a journal is kept: any that no other print has.
+ */
+journal: number | null, };

@@ -252,6 +252,11 @@ impl Link {
         self.window.uncovered().into_iter().chain(self.lanes.uncovered()).min()
     }
 
+    /// The earliest clock at which any motion is due that has not been sent.
+    pub fn motion_waiting(&self) -> Option<Ticks> {
+        self.lanes.uncovered()
+    }
+
     /// The clock of the last step of a motion lane that the board has acknowledged; zero before the first.
     pub fn motion_acknowledged(&self, lane: u8) -> Ticks {
         self.window.motion_ends().get(usize::from(lane)).copied().unwrap_or_default()

@@ -77,6 +77,7 @@ pub struct Planner {
     look_ahead: LookAhead,
     generator: StepGenerator,
     position: Position,
+    clock: Hertz,
     run: Run,
     moves_pushed: u64,
     moves_planned: u64,
@@ -105,6 +106,7 @@ impl Planner {
             limits,
             generator: machine::step_generator(config, clock)?,
             position: [0.0; 4],
+            clock,
             run: Run::None,
             moves_pushed: 0,
             moves_planned: 0,
@@ -122,6 +124,11 @@ impl Planner {
     /// Where the last accepted move ends.
     pub const fn position(&self) -> Position {
         self.position
+    }
+
+    /// The clock in whose ticks step commands are.
+    pub const fn clock(&self) -> Hertz {
+        self.clock
     }
 
     /// Whether there is no run of motion.
@@ -189,12 +196,15 @@ impl Planner {
         self.is_broken
     }
 
-    /// Lets the machine come to rest after the moves that were read; [`Planned::RunEnded`] tells when.
-    pub fn finish_run(&mut self) {
-        if self.run == Run::Active {
+    /// Lets the machine come to rest after the moves that were read; [`Planned::RunEnded`] tells when. Whether that
+    /// changed anything.
+    pub fn finish_run(&mut self) -> bool {
+        let is_active = self.run == Run::Active;
+        if is_active {
             self.look_ahead.flush();
             self.run = Run::Ending;
         }
+        is_active
     }
 
     /// Forgets a barrier that has been read and not been reached.
@@ -278,7 +288,9 @@ impl Planner {
                 source::Next::Diagnostic(diagnostic) => return Ok(Planned::Notice(diagnostic)),
                 source::Next::NeedsInput => return Ok(Planned::NeedsInput),
                 source::Next::End if self.run == Run::None => return Ok(Planned::EndOfSource),
-                source::Next::End => self.finish_run(),
+                source::Next::End => {
+                    self.finish_run();
+                }
             }
         }
     }

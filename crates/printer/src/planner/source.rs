@@ -12,6 +12,7 @@ pub const SOURCE_BYTES_MAX: usize = 64 * 1024;
 #[derive(Debug)]
 pub struct Source {
     lines: Lines,
+    fed: u64,
     ended: bool,
     /// The modal state.
     pub interpreter: Interpreter,
@@ -45,6 +46,7 @@ impl Source {
     pub fn new(settings: Settings) -> Self {
         Self {
             lines: Lines::new(),
+            fed: 0,
             ended: false,
             interpreter: Interpreter::new(settings),
             actions: Vec::new(),
@@ -63,7 +65,13 @@ impl Source {
 
     /// Takes the next bytes of the stream.
     pub fn feed(&mut self, bytes: &[u8]) {
+        self.fed += bytes.len() as u64;
         self.lines.feed(bytes);
+    }
+
+    /// Bytes fed so far.
+    pub const fn fed(&self) -> u64 {
+        self.fed
     }
 
     /// Takes a text of its own, of which the first line is line 1. Everything before has been read.

@@ -137,6 +137,15 @@ impl Board {
         }
     }
 
+    /// Asks motors how far they have come in their rows.
+    pub(super) fn ask_queues(&mut self, wanted: impl Fn(usize) -> bool) {
+        for (motor, oids) in self.layout.steppers.into_iter().enumerate() {
+            if let Some(oids) = oids.filter(|_| wanted(motor)) {
+                self.control(&Command::StepperGetQueue { oid: oids.stepper.0 });
+            }
+        }
+    }
+
     /// Sends a command ahead of everything.
     pub(super) fn immediate(&mut self, command: &Command<'_>) {
         self.send(Lane::Immediate, command, |message| message);

@@ -8,6 +8,7 @@ use wire::{
 };
 
 use super::{
+    attach::{Answer, Asking},
     board::{Board, Losses},
     event::{Event, PhaseName},
     inbox::{self, Message},
@@ -19,6 +20,7 @@ use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
     identify::{Identify, IdentifyError, PIECE_BYTES},
+    journal::BoardQueue,
     link::{Lane, Link, Outgoing},
 };
 
@@ -161,6 +163,8 @@ fn dictionary_error(error: &IdentifyError) -> PrinterError {
 enum Step {
     /// The state of the configuration and a clock that can be trusted.
     State,
+    /// Whether a board that has been set up holds a print.
+    Asking,
     /// The configuration to be taken in.
     Sent,
 }
@@ -173,6 +177,8 @@ pub(super) enum Outcome {
     Ready,
     /// The board has been set up by somebody else: it has to start anew.
     NeedsRestart,
+    /// The board has stopped on the path of a print whose host is gone.
+    Holds(BoardQueue),
     /// The board is in shutdown for this reason.
     Shutdown(u16),
 }
@@ -185,6 +191,7 @@ pub(super) struct Connecting {
     asked: Option<Seconds>,
     began: Option<Seconds>,
     config: Option<Message>,
+    asking: Asking,
 }
 
 impl Connecting {
@@ -230,12 +237,13 @@ impl Connecting {
         if let Some(checks) = board.dictionary.block_checks() {
             board.link.set_checks(checks);
         }
-        Ok((Self { board, step: Step::State, asked: None, began: None, config: None }, event))
+        let asking = Asking::default();
+        Ok((Self { board, step: Step::State, asked: None, began: None, config: None, asking }, event))
     }
 
     pub(super) const fn phase(&self) -> PhaseName {
         match self.step {
-            Step::State => PhaseName::Synchronising,
+            Step::State | Step::Asking => PhaseName::Synchronising,
             Step::Sent => PhaseName::Configuring,
         }
     }
@@ -246,7 +254,7 @@ impl Connecting {
                 Message::Clock(low) => self.board.sync.clock(low, sent, now),
                 Message::Uptime { high, low } => self.board.sync.uptime(high, low, sent, now),
                 Message::Config { .. } | Message::Shutdown { .. } => self.config = Some(message),
-                _ => {}
+                _ => self.asking.receive(message, &mut self.board, now),
             }
         }
     }
@@ -272,7 +280,14 @@ impl Connecting {
             }
             _ => {}
         }
-        let idle = self.step == Step::State || self.board.link.is_idle();
+        if self.step == Step::Asking {
+            match self.asking.poll(&mut self.board, now) {
+                Answer::Pending => {}
+                Answer::Nothing => return Ok(Outcome::NeedsRestart),
+                Answer::Holds(queue) => return Ok(Outcome::Holds(queue)),
+            }
+        }
+        let idle = self.step != Step::Sent || self.board.link.is_idle();
         if idle && self.asked.is_none_or(|asked| now - asked >= ASK_AGAIN) {
             self.asked = Some(now);
             self.board.control(&Command::GetConfig {});
@@ -290,7 +305,15 @@ impl Connecting {
         move_count: u16,
     ) -> Result<Option<Outcome>, PrinterError> {
         match self.step {
-            Step::State if is_config => Ok(Some(Outcome::NeedsRestart)),
+            Step::State if is_config => {
+                if crc != self.board.layout.crc || !self.board.layout.has_motion_clock {
+                    return Ok(Some(Outcome::NeedsRestart));
+                }
+                let clock = self.board.clock;
+                self.board.link.set_board(clock, move_count);
+                self.step = Step::Asking;
+                Ok(None)
+            }
             Step::State if self.board.sync.is_settled() => {
                 let commands = self.board.layout.commands.clone();
                 for command in &commands {
@@ -311,7 +334,7 @@ impl Connecting {
                 Ok(Some(Outcome::Ready))
             }
             Step::Sent if is_config => Err(ErrorCode::ConfigMismatch.into()),
-            Step::State | Step::Sent => Ok(None),
+            Step::State | Step::Asking | Step::Sent => Ok(None),
         }
     }
 }

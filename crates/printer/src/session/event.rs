@@ -219,6 +219,9 @@ pub enum PhaseName {
     Restarting,
     /// The board's pins are being set up.
     Configuring,
+    /// The board holds a print whose host is gone. Whoever has its journal can take it up
+    /// ([`super::Session::take_up`]); everybody else restarts the board.
+    Holding,
     /// Ready for commands.
     Ready,
     /// The board has stopped everything and says why; a firmware restart is needed.

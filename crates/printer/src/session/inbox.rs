@@ -7,7 +7,7 @@ use wire::{
 };
 
 use super::motion_time::MotionReport;
-use crate::link::Link;
+use crate::{journal::MotorQueue, link::Link};
 
 /// A message from the board, without borrowed bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub(super) enum Message {
     Trigger { oid: u8, can_trigger: bool, reason: u8 },
     Analog { oid: u8, next_clock: Clock32, sum: u16 },
     Motion(MotionReport),
-    Queue { oid: u8, position: i32 },
+    Queue { oid: u8, job: u32, queue: MotorQueue },
     Shutdown { reason: u16 },
     Starting,
 }
@@ -73,7 +73,19 @@ fn message(response: &Response<'_>) -> Option<Message> {
         Response::MotionState { clock, motion, rate, state, reason } => {
             Message::Motion(MotionReport::new(clock, motion, rate, state, reason))
         }
-        Response::StepperQueue { oid, pos, .. } => Message::Queue { oid, position: pos },
+        Response::StepperQueue { oid, job, received, done, left, next, dir, pos, crc } => Message::Queue {
+            oid,
+            job,
+            queue: MotorQueue {
+                received,
+                done,
+                left,
+                next: Clock32(next),
+                dir: dir != 0,
+                position: pos,
+                crc,
+            },
+        },
         Response::Stats { .. } | Response::IdentifyResponse { .. } | Response::BlockChecked { .. } => {
             return None;
         }

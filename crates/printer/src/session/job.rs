@@ -22,6 +22,9 @@ pub struct JobOptions {
     pub confirmed_lines: BTreeSet<u32>,
     /// Confirm all of them.
     pub confirm_all: bool,
+    /// The print's own number, with which a journal is kept ([`crate::journal`]). Any that no other print has; the next
+    /// million belong to it too.
+    pub journal: Option<u32>,
 }
 
 /// What a job is doing.

@@ -25,8 +25,10 @@ pub(super) enum MotionState {
 /// Why motion is held, or slows down to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum HoldReason {
-    /// It is not, or the host asked for it.
+    /// It is not.
     None,
+    /// A host asked for it.
+    Asked,
     /// The host was not heard of in time.
     HostAway,
     /// The queue was about to run dry.
@@ -57,6 +59,7 @@ impl MotionReport {
                 _ => MotionState::Running,
             },
             reason: match reason {
+                1 => HoldReason::Asked,
                 2 => HoldReason::HostAway,
                 3 => HoldReason::QueueDry,
                 _ => HoldReason::None,
@@ -91,7 +94,8 @@ impl Default for MotionTime {
 }
 
 impl MotionTime {
-    /// The motion clock at a hardware clock; never beyond what it can be.
+    /// The motion clock at a hardware clock; never beyond what it can be. While it slows, no more is claimed than was told:
+    /// what it was told to run at, it runs at no longer.
     pub(super) fn at(&self, clock: Ticks) -> Ticks {
         if self.in_doubt {
             return self.motion;
@@ -99,6 +103,7 @@ impl MotionTime {
         let since = clock.0 as i64 - self.clock.0 as i64;
         let made = match (self.state, self.rate) {
             (MotionState::Running, RATE_ONE) => since,
+            (MotionState::Slowing, _) => 0,
             (_, rate) => since.max(0) / i64::from(RATE_ONE) * i64::from(rate.min(RATE_ONE)),
         };
         Ticks(self.motion.0.saturating_add_signed(made))
@@ -113,6 +118,11 @@ impl MotionTime {
     pub(super) fn hardware(&self, motion: Ticks, clock_now: Ticks) -> Ticks {
         let ahead = motion.0 as i64 - self.at(clock_now).0 as i64;
         Ticks(clock_now.0.saturating_add_signed(ahead))
+    }
+
+    /// Whether motion is at rest, wherever on its path.
+    pub(super) const fn is_held(&self) -> bool {
+        !self.in_doubt && matches!(self.state, MotionState::Held)
     }
 
     /// Whether the two clocks are a fixed lag apart.

@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     error::{Ended, ErrorCode, PrinterError},
+    journal::Input,
     machine,
     planner::Position,
 };
@@ -37,16 +38,19 @@ impl Session {
             }
             Request::SetTemperature(heater, target) => {
                 ready.thermal.set_target(heater, target, &mut ready.board, now)?;
+                ready.diary.target(heater, target.0);
             }
             Request::SetFan(speed) => ready.thermal.set_fan(speed, None, &mut ready.board, now),
             Request::SetSpeedFactor(factor) => {
                 ready.sources().for_each(|source| source.interpreter.set_speed_factor(factor));
+                ready.diary.input(Input::Speed(factor));
             }
             Request::SetFlowFactor(factor) => {
                 ready.sources().for_each(|source| source.interpreter.set_flow_factor(factor));
+                ready.diary.input(Input::Flow(factor));
             }
             Request::Pause => ready.pause(now)?,
-            Request::Resume => ready.resume()?,
+            Request::Resume => ready.resume(now)?,
             Request::Cancel => ready.cancel(now)?,
             Request::EmergencyStop | Request::FirmwareRestart => {}
         }
@@ -66,6 +70,10 @@ impl Session {
                 board.link.forget_all();
                 board.immediate(&Command::EmergencyStop {});
                 self.stopped(board, error);
+            }
+            Stage::Holding(holding) => {
+                self.stage = Stage::Holding(holding);
+                self.on_failure(Failure::Stop(error), now);
             }
             // It has stopped, but who presses that button does not trust it.
             Stage::Shutdown(mut board) => {
@@ -92,6 +100,7 @@ impl Session {
         }
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
         ready.planner.begin_job(&mut job.source);
+        ready.diary.begin(&job.options, &ready.config, &ready.planner, now);
         ready.last_active = now;
         ready.stream.reset_elapsed();
         job.told = now;
@@ -103,6 +112,7 @@ impl Session {
     pub fn job_wants(&self) -> usize {
         match &self.stage {
             Stage::Ready(ready) => ready.job.as_ref().map_or(0, |job| job.source.wants()),
+            Stage::Holding(holding) => holding.wants(),
             _ => 0,
         }
     }
@@ -110,6 +120,12 @@ impl Session {
     /// The next bytes of the job's file, no more than [`Self::job_wants`]: more than that ends the job, since they would
     /// have to be dropped or kept without bound.
     pub fn job_feed(&mut self, bytes: &[u8]) {
+        if let Stage::Holding(holding) = &mut self.stage {
+            let fits = bytes.len() <= holding.wants();
+            if let Some(replay) = holding.replay().filter(|_| fits) {
+                replay.feed(bytes);
+            }
+        }
         if let Stage::Ready(ready) = &mut self.stage
             && let Some(job) = &mut ready.job
         {
@@ -125,6 +141,11 @@ impl Session {
 
     /// The job's file has ended.
     pub fn job_end(&mut self) {
+        if let Stage::Holding(holding) = &mut self.stage
+            && let Some(replay) = holding.replay()
+        {
+            replay.end();
+        }
         if let Stage::Ready(ready) = &mut self.stage
             && let Some(job) = &mut ready.job
         {

@@ -13,6 +13,7 @@ use wire::Command;
 
 use super::{board::Board, event::ScheduledMove};
 use crate::{
+    journal::Row,
     link::Lane,
     machine::MOTORS,
     planner::{Position, TimedAction},
@@ -50,6 +51,20 @@ pub(super) struct Run {
     pub(super) homing: bool,
 }
 
+/// A run that was begun by a host that is gone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TakenUp {
+    pub(super) start: Ticks,
+    pub(super) end: Option<Ticks>,
+    /// Where the board counts each motor to be.
+    pub(super) counts: [i32; MOTORS],
+    /// The same at the start of the run, and the machine's position there.
+    pub(super) counts_at_start: [i32; MOTORS],
+    pub(super) position_at_start: Position,
+    /// Print time of the runs before.
+    pub(super) elapsed: Seconds,
+}
+
 /// What has to be said to a motor before its next steps.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pending {
@@ -66,7 +81,9 @@ pub(super) struct MotionStream {
     enabled: [bool; MOTORS],
     /// The hardware clock at which each motor's driver was last switched: the next switch must come later.
     switched: [Ticks; MOTORS],
-    /// The level of the direction pin for each motor's next steps: high counts up.
+    /// The direction of each motor's next steps, as planned …
+    planned_forward: [bool; MOTORS],
+    /// … and the level of its direction pin for them: high counts up.
     forward: [bool; MOTORS],
     /// Where the board counts each motor to be once all of its steps have been made.
     counts: [i32; MOTORS],
@@ -170,35 +187,84 @@ impl MotionStream {
 
     /// A motor's next step command, of the run that is being made.
     pub(super) fn push(&mut self, command: &StepCommand, board: &mut Board, now: Seconds) {
-        let Some(run) = self.run else { return };
         let motor = command.motor;
-        let Some(oids) = board.layout.steppers[motor] else { return };
-        let oid = oids.stepper.0;
-        let (interval, count, add) = match command.kind {
-            StepCommandKind::SetDir { forward } => {
-                self.forward[motor] = forward != oids.invert_dir;
-                // It travels with the steps that it is for.
-                self.pending[motor].forward = Some(forward);
-                return;
+        match command.kind {
+            StepCommandKind::SetDir { forward } => self.turn(motor, forward, board),
+            StepCommandKind::QueueStep { interval, count, add } => {
+                let forward = self.planned_forward[motor];
+                let row = Row { interval, count, add, forward, start: command.start, end: command.end };
+                self.send(motor, &row, board, now);
             }
-            StepCommandKind::QueueStep { interval, count, add } => (interval, count, add),
-        };
-        // A single step after a long rest has an interval modulo 2³²: its own clock is what counts.
-        let first = if count == 1 { command.end } else { command.start + Ticks(u64::from(interval)) };
-        let due = run.start + first;
+        }
+    }
+
+    /// The direction of a motor's steps from here on. The order travels with the steps that it is for.
+    fn turn(&mut self, motor: usize, forward: bool, board: &Board) {
+        let Some(oids) = board.layout.steppers[motor] else { return };
+        self.planned_forward[motor] = forward;
+        self.forward[motor] = forward != oids.invert_dir;
+        self.pending[motor].forward = Some(forward);
+    }
+
+    fn send(&mut self, motor: usize, row: &Row, board: &mut Board, now: Seconds) {
+        let (Some(run), Some(oids)) = (self.run, board.layout.steppers[motor]) else { return };
+        let oid = oids.stepper.0;
+        let due = run.start + row.first();
         self.enable(motor, due, board, now);
         let Pending { reset, forward } = core::mem::take(&mut self.pending[motor]);
         if reset {
-            board.motion(motor, &Command::ResetStepClock { oid, clock: run.start.low().0 }, due, None);
+            let clock = run.start + row.start;
+            board.motion(motor, &Command::ResetStepClock { oid, clock: clock.low().0 }, due, None);
         }
         if let Some(forward) = forward {
             let dir = u8::from(forward != oids.invert_dir);
             board.motion(motor, &Command::SetNextStepDir { oid, dir }, due, None);
         }
+        let Row { interval, count, add, .. } = *row;
         let made = i32::from(count);
         self.counts[motor] = self.counts[motor].wrapping_add(if self.forward[motor] { made } else { -made });
-        let end = run.start + command.end;
+        let end = run.start + row.end;
         board.motion(motor, &Command::QueueStep { oid, interval, count, add }, due, Some(end));
+    }
+
+    /// Takes up a run that the board holds.
+    pub(super) fn take_up(&mut self, taken: &TakenUp) -> Run {
+        let run = Run { start: taken.start, end: taken.end, homing: false };
+        self.run = Some(run);
+        self.counts = taken.counts;
+        self.counts_at_start = taken.counts_at_start;
+        self.position_at_start = taken.position_at_start;
+        self.elapsed = taken.elapsed;
+        self.enabled = [true; MOTORS];
+        run
+    }
+
+    /// Gives a board that has dropped its queue the steps again that it had not made, before those that are pushed next.
+    /// `forward` is the direction that holds after them.
+    pub(super) fn give_again(
+        &mut self,
+        backlog: &[VecDeque<Row>; MOTORS],
+        forward: [bool; MOTORS],
+        board: &mut Board,
+        now: Seconds,
+    ) {
+        let clock = board.output_clock(now);
+        for (motor, rows) in backlog.iter().enumerate() {
+            // They are on already, as far as anybody knows.
+            self.switched[motor] = clock;
+            Self::switch_driver(motor, true, clock, board);
+            self.pending[motor].reset = true;
+            self.turn(motor, rows.front().map_or(forward[motor], |row| row.forward), board);
+            for row in rows {
+                if row.forward != self.planned_forward[motor] {
+                    self.turn(motor, row.forward, board);
+                }
+                self.send(motor, row, board, now);
+            }
+            if forward[motor] != self.planned_forward[motor] {
+                self.turn(motor, forward[motor], board);
+            }
+        }
     }
 
     /// Something happens when the board's clock gets to `at`. In the order of the clocks.

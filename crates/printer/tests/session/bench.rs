@@ -100,6 +100,8 @@ pub(crate) struct Bench {
     /// The session is not called.
     pub(crate) stalled: bool,
     to_host: Vec<u8>,
+    /// The job's journal, as it is kept.
+    pub(crate) journal: String,
 }
 
 impl Bench {
@@ -125,6 +127,7 @@ impl Bench {
             fed: 0,
             stalled: false,
             to_host: Vec::new(),
+            journal: String::new(),
         }
     }
 
@@ -193,6 +196,7 @@ impl Bench {
         let mut bytes = Vec::new();
         loop {
             let wake = self.session.poll(self.now(), &mut bytes);
+            self.journal += &self.session.take_journal();
             self.printer.write(&bytes);
             bytes.clear();
             self.take_events();
@@ -210,7 +214,7 @@ impl Bench {
     fn feed(&mut self) -> bool {
         let wants = self.session.job_wants();
         let wants = wants.min(self.feed_max - self.fed);
-        if wants == 0 || self.session.job_status() == JobStatus::None {
+        if wants == 0 {
             return false;
         }
         if self.file.is_empty() {
@@ -271,10 +275,15 @@ impl Bench {
         assert!(position.is_some_and(|(_, homed)| homed == [true; 3]), "{:?}", self.remarkable());
     }
 
-    pub(crate) fn start_with(&mut self, file: &str, options: JobOptions) -> Result<(), PrinterError> {
+    /// The file that is fed to the job, from its beginning.
+    pub(crate) fn load(&mut self, file: &str) {
         self.file = file.bytes().collect();
         self.file_ended = false;
         self.fed = 0;
+    }
+
+    pub(crate) fn start_with(&mut self, file: &str, options: JobOptions) -> Result<(), PrinterError> {
+        self.load(file);
         let now = self.now();
         self.session.start_job(options, now)
     }

@@ -82,8 +82,8 @@ impl Ready {
     }
 
     /// Goes on with what is held; else goes back to where the job was paused, and on.
-    pub(in crate::session) fn resume(&mut self) -> Result<(), PrinterError> {
-        if self.resume_held()? {
+    pub(in crate::session) fn resume(&mut self, now: Seconds) -> Result<(), PrinterError> {
+        if self.resume_held(now)? {
             return Ok(());
         }
         let paused = self.job.as_ref().filter(|job| job.state == JobState::Paused);
@@ -188,6 +188,7 @@ impl Ready {
 
     fn forget_job(&mut self, event: Event) {
         self.job = None;
+        self.diary.end();
         self.held = Held::default();
         self.planner.drop_barrier();
         self.console.clear();

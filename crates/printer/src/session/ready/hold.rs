@@ -8,9 +8,10 @@
 use units::{Celsius, Seconds, Ticks};
 use wire::Command;
 
-use super::{Failure, Ready};
+use super::{Failure, Ready, take_up::Rest};
 use crate::{
     error::{ErrorCode, PrinterError},
+    journal::MotorQueue,
     link::SCHEDULE_AHEAD_TICKS_MAX,
     machine::{self, MOTORS},
     planner::ExtrusionPermit,
@@ -18,6 +19,7 @@ use crate::{
         board::FAN_LANE,
         event::Event,
         job::{JobState, JobStatus},
+        layout::StepperOids,
         lease::Cover,
         motion_time::{HoldReason, MotionReport, MotionState},
     },
@@ -43,6 +45,8 @@ enum Phase {
     Slowing,
     /// At rest: the user decides.
     AtRest,
+    /// The user wants to go on with what another host began: the board drops what it has, and gets it again.
+    Rejoining { since: Seconds, asked: Seconds, answered: [bool; MOTORS] },
     /// The user wants to go on; since when the board has been told, if it has.
     Resuming(Option<Ticks>),
     /// The user wants to end it: the queue is dropped, and each motor says where it stands.
@@ -59,6 +63,10 @@ pub(super) struct Hold {
     /// The nozzle's temperature then, and whether it was hot enough to push filament.
     nozzle: Option<Celsius>,
     could_extrude: bool,
+    /// The user has been told.
+    is_told: bool,
+    /// What the board has to be given again, where another host began.
+    rest: Option<Box<Rest>>,
 }
 
 /// When the session was last called, and the longest pause since then that it has noticed.
@@ -81,7 +89,7 @@ impl Ready {
         match self.hold.as_ref()?.phase {
             Phase::AtRest => Some(JobStatus::Held),
             Phase::Dropping { .. } => Some(JobStatus::Ending),
-            Phase::Slowing | Phase::Resuming(_) | Phase::Leaving { .. } => None,
+            Phase::Slowing | Phase::Rejoining { .. } | Phase::Resuming(_) | Phase::Leaving { .. } => None,
         }
     }
 
@@ -114,10 +122,31 @@ impl Ready {
             && at_rest
             && matches!(hold.phase, Phase::Slowing)
         {
+            if hold.reason == HoldReason::QueueDry && self.lease.is_at_start() {
+                // Its run has yet to begin: it only begins a little later.
+                hold.phase = Phase::Resuming(None);
+                return;
+            }
             hold.phase = Phase::AtRest;
-            let error = hold_error(hold.reason, self.calls.gap.take());
+            hold.is_told = true;
+            let error = match hold.rest {
+                Some(_) => ErrorCode::HeldForHost.into(),
+                None => hold_error(hold.reason, self.calls.gap.take()),
+            };
             self.events.push(Event::Held(error));
         }
+    }
+
+    /// Motion that another host began is held, or about to be.
+    pub(super) fn hold_for_host(&mut self, rest: Rest) {
+        self.hold = Some(Hold {
+            phase: Phase::Slowing,
+            reason: HoldReason::HostAway,
+            nozzle: None,
+            could_extrude: false,
+            is_told: false,
+            rest: Some(Box::new(rest)),
+        });
     }
 
     fn begin_hold(&mut self, reason: HoldReason) {
@@ -126,15 +155,18 @@ impl Ready {
             reason,
             nozzle: self.nozzle(),
             could_extrude: self.extrusion_permit() == ExtrusionPermit::Allowed,
+            is_told: false,
+            rest: None,
         });
     }
 
     /// Motion goes at its full rate.
     fn hold_is_over(&mut self) {
-        let Some(hold) = self.hold.take_if(|hold| !matches!(hold.phase, Phase::Dropping { .. })) else {
+        let is_over = |hold: &mut Hold| hold.rest.is_none() && !matches!(hold.phase, Phase::Dropping { .. });
+        let Some(hold) = self.hold.take_if(is_over) else {
             return;
         };
-        if !matches!(hold.phase, Phase::Leaving { .. }) {
+        if hold.is_told && !matches!(hold.phase, Phase::Leaving { .. }) {
             self.events.push(Event::Resumed);
         }
     }
@@ -144,7 +176,7 @@ impl Ready {
     }
 
     /// Goes on with what is held, with the very next step; `false` where nothing is.
-    pub(super) fn resume_held(&mut self) -> Result<bool, PrinterError> {
+    pub(super) fn resume_held(&mut self, now: Seconds) -> Result<bool, PrinterError> {
         let nozzle = self.nozzle();
         let permit = self.extrusion_permit();
         let Some(hold) = self.hold.as_mut().filter(|hold| matches!(hold.phase, Phase::AtRest)) else {
@@ -156,7 +188,13 @@ impl Ready {
             let detail = format!("the nozzle has cooled to {:.0} °C while the print was held", celsius.0);
             return Err(PrinterError::new(ErrorCode::ColdExtrusion, detail));
         }
-        hold.phase = Phase::Resuming(None);
+        hold.phase = match &hold.rest {
+            Some(_) => {
+                let asked = Seconds(f64::NEG_INFINITY);
+                Phase::Rejoining { since: now, asked, answered: [false; MOTORS] }
+            }
+            None => Phase::Resuming(None),
+        };
         Ok(true)
     }
 
@@ -167,6 +205,7 @@ impl Ready {
         };
         let asked = Seconds(f64::NEG_INFINITY);
         hold.phase = Phase::Dropping { since: now, asked, counts: [None; MOTORS] };
+        hold.rest = None;
         self.thermal.all_off(&mut self.board, now);
         self.board.control(&Command::MotionDrop {});
         if let Some(job) = self.job.as_mut().filter(|job| !job.is_ending()) {
@@ -176,11 +215,13 @@ impl Ready {
     }
 
     /// A motor's answer to a dropped queue.
-    pub(super) fn on_queue(&mut self, oid: u8, position: i32) {
-        let Some(Hold { phase: Phase::Dropping { counts, .. }, .. }) = &mut self.hold else { return };
-        let motors = self.board.layout.steppers.iter().zip(counts);
-        for (_, count) in motors.filter(|(oids, _)| oids.is_some_and(|oids| oids.stepper.0 == oid)) {
-            *count = Some(position);
+    pub(super) fn on_queue(&mut self, oid: u8, queue: &MotorQueue) {
+        let is_it = |oids: &Option<StepperOids>| oids.is_some_and(|oids| oids.stepper.0 == oid);
+        let Some(motor) = self.board.layout.steppers.iter().position(is_it) else { return };
+        match self.hold.as_mut().map(|hold| &mut hold.phase) {
+            Some(Phase::Dropping { counts, .. }) => counts[motor] = Some(queue.position),
+            Some(Phase::Rejoining { answered, .. }) => answered[motor] = true,
+            _ => {}
         }
     }
 
@@ -188,7 +229,34 @@ impl Ready {
     pub(super) fn advance_hold(&mut self, now: Seconds) -> Result<(), Failure> {
         let Some(mut hold) = self.hold.take() else { return Ok(()) };
         match &mut hold.phase {
-            Phase::Slowing | Phase::Resuming(Some(_)) => {}
+            Phase::Slowing => {
+                if let Some(rest) = &mut hold.rest {
+                    rest.stop(self.lease.ramp(), &mut self.board, now);
+                }
+            }
+            Phase::Resuming(Some(_)) => {}
+            Phase::Rejoining { since, asked, answered } => {
+                let all = self
+                    .board
+                    .layout
+                    .steppers
+                    .iter()
+                    .zip(answered.iter())
+                    .all(|(oids, is)| oids.is_none() || *is);
+                if all {
+                    hold.phase = Phase::Resuming(None);
+                    if let Some(rest) = hold.rest.take() {
+                        self.rejoin(&rest, now);
+                    }
+                } else if now - *since > ANSWER_MAX {
+                    let detail = "it does not say where its motors stand";
+                    return Err(Failure::Stop(PrinterError::new(ErrorCode::LinkTimeout, detail)));
+                } else if now - *asked >= ASK_AGAIN {
+                    *asked = now;
+                    self.board.control(&Command::MotionDrop {});
+                    self.board.ask_queues(|motor| !answered[motor]);
+                }
+            }
             Phase::AtRest => self.cool_down(now),
             Phase::Resuming(told @ None) => {
                 if let Some(cover) = self.cover_to_resume(now) {
@@ -211,9 +279,8 @@ impl Ready {
                     return Err(Failure::Stop(PrinterError::new(ErrorCode::LinkTimeout, detail)));
                 } else if now - *asked >= ASK_AGAIN {
                     *asked = now;
-                    for oids in self.board.layout.steppers.into_iter().flatten() {
-                        self.board.control(&Command::StepperGetQueue { oid: oids.stepper.0 });
-                    }
+                    // Only those who have not answered: a small board has no room for all answers at once.
+                    self.board.ask_queues(|motor| counts[motor].is_none());
                 }
             }
             Phase::Leaving { asked } => {
@@ -225,6 +292,12 @@ impl Ready {
         }
         self.hold = Some(hold);
         Ok(())
+    }
+
+    /// Whether the board is in a run that another host began, and has not been given its steps again: until the user
+    /// says so, nothing of the plan may take effect.
+    pub(super) fn waits_to_rejoin(&self) -> bool {
+        self.hold.as_ref().is_some_and(|hold| hold.rest.is_some())
     }
 
     /// Nobody decides for too long.

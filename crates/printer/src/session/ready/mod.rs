@@ -6,6 +6,7 @@
 mod ending;
 mod hold;
 mod plan;
+mod take_up;
 mod waiting;
 
 use gcode::LineNumber;
@@ -19,6 +20,7 @@ use super::{
     board::Board,
     connect,
     console::Console,
+    diary::Diary,
     event::{Event, Events},
     inbox::{self, Message},
     job::{Job, JobStatus, PROGRESS_INTERVAL},
@@ -38,6 +40,8 @@ use crate::{
 const PUMP_INTERVAL: Seconds = Seconds(0.05);
 /// How often a machine at rest looks after itself.
 const IDLE_INTERVAL: Seconds = Seconds(0.25);
+/// Motion that is due this long ago and has not been sent is none that the board could make.
+const LATE_MAX: Seconds = Seconds(1.0);
 
 /// What a failure leads to.
 #[derive(Debug)]
@@ -66,6 +70,7 @@ pub(super) struct Ready {
     /// What a paused job was waiting for.
     held: Held,
     pub(super) events: Events,
+    pub(super) diary: Diary,
     pub(super) last_active: Seconds,
     lease: Lease,
     /// Motion is held.
@@ -74,13 +79,18 @@ pub(super) struct Ready {
 }
 
 impl Ready {
-    pub(super) fn new(config: PrinterConfig, mut board: Board, now: Seconds) -> Result<Self, PrinterError> {
-        let mut planner = Planner::new(&config, board.clock)?;
+    pub(super) fn new(config: PrinterConfig, board: Board, now: Seconds) -> Result<Self, PrinterError> {
+        let planner = Planner::new(&config, board.clock)?;
+        let mut ready = Self::with_planner(config, board, planner, now);
+        ready.planner.adopt(&mut ready.console.source);
+        Ok(ready)
+    }
+
+    fn with_planner(config: PrinterConfig, mut board: Board, planner: Planner, now: Seconds) -> Self {
         let thermal = Thermal::start(&config, &mut board, now);
-        let mut console = Console::new(Source::new(machine::gcode_settings(&config)));
-        planner.adopt(&mut console.source);
+        let console = Console::new(Source::new(machine::gcode_settings(&config)));
         let lease = Lease::new(&config);
-        Ok(Self {
+        Self {
             config,
             board,
             planner,
@@ -92,11 +102,12 @@ impl Ready {
             wait: Wait::Nothing,
             held: Held::default(),
             events: Events::default(),
+            diary: Diary::default(),
             last_active: now,
             lease,
             hold: None,
             calls: Calls::default(),
-        })
+        }
     }
 
     /// What the job is doing.
@@ -154,7 +165,7 @@ impl Ready {
             Message::Starting => return Err(Failure::Lost(ErrorCode::BoardRestarted.into())),
             Message::Config { .. } => {}
             Message::Motion(report) => self.on_motion(&report, now),
-            Message::Queue { oid, position } => self.on_queue(oid, position),
+            Message::Queue { oid, queue, .. } => self.on_queue(oid, &queue),
             Message::Position { .. } | Message::Endstop { .. } | Message::Trigger { .. } => {
                 self.on_homing_message(message, now);
             }
@@ -208,6 +219,7 @@ impl Ready {
         if !self.lease.is_in_doubt(&mut self.board, now) {
             self.go_on(now)?;
         }
+        self.check_late(now)?;
         let link_wake = self.board.link.poll(now, self.board.clocks(now), out);
         let busy = self.stream.run().is_some() || !matches!(self.wait, Wait::Nothing);
         let own_wake = now + if busy { PUMP_INTERVAL } else { IDLE_INTERVAL };
@@ -215,8 +227,19 @@ impl Ready {
         Ok(link_wake.map_or(wake, |link| link.min(wake)))
     }
 
+    /// Steps that were due long ago must not be sent: beyond half of its clock's range a board takes what is past for what
+    /// is to come.
+    fn check_late(&self, now: Seconds) -> Result<(), Failure> {
+        let due = self.board.link.motion_waiting();
+        let late = due.is_some_and(|due| due + self.board.ticks(LATE_MAX) < self.board.motion_at(now));
+        if late { Err(Failure::Stop(ErrorCode::OrdersTooLate.into())) } else { Ok(()) }
+    }
+
     /// Does what is due by the motion clock, and what follows from it.
     fn go_on(&mut self, now: Seconds) -> Result<(), Failure> {
+        if self.waits_to_rejoin() {
+            return self.advance_hold(now);
+        }
         let motion_now = self.board.motion_at(now);
         while let Some(due) = self.stream.pop_due(motion_now) {
             self.on_due(due, now);
@@ -236,6 +259,9 @@ impl Ready {
         match due {
             Due::MoveEnd(made) => {
                 let elapsed = self.stream.elapsed(made.end, &self.board);
+                if made.line > 0 && self.plans_job() {
+                    self.diary.progress(made.line, elapsed, now);
+                }
                 if let Some(job) =
                     self.job.as_mut().filter(|job| made.line > 0 && now - job.told >= PROGRESS_INTERVAL)
                 {

@@ -1,16 +1,18 @@
 //! From the planner to the board: items of the plan, one after the other, as far ahead as the stream wants them.
 
 use gcode::{Heater as HeaterName, LineNumber, Severity};
+use motion::PlannedMove;
 use units::{Celsius, Seconds};
 
 use super::{Failure, Ready, Wait};
 use crate::{
     error::{ErrorCode, PrinterError},
+    journal::Input,
     planner::{Barrier, ExtrusionPermit, Planned, TimedAction},
     session::{
         event::{Event, ScheduledMove, SpeedProfile},
         job::{Job, JobState},
-        stream::Due,
+        stream::{Due, Run},
     },
 };
 
@@ -40,16 +42,24 @@ impl Ready {
                     JobState::Pausing | JobState::Returning | JobState::Cancelling | JobState::Failing(_)
                 )
             });
-            if stopping {
-                self.planner.finish_run();
+            if stopping && !homing {
+                self.finish_run();
             }
+            let is_jobs = !homing && self.plans_job();
+            let fed = self.job.as_ref().map_or(0, |job| job.source.fed());
             let source = match &mut self.job {
                 _ if homing || stopping => &mut self.silence,
                 Some(job) if job.is_active() => &mut job.source,
                 _ => &mut self.console.source,
             };
             let planned = match self.planner.next(source) {
-                Ok(planned) => planned,
+                Ok(planned) => {
+                    // What comes to rest reads nothing.
+                    if is_jobs && !(stopping && planned == Planned::NeedsInput) {
+                        self.diary.planned(&planned, fed);
+                    }
+                    planned
+                }
                 Err(error) if self.planner.is_broken() => return Err(Failure::Stop(error)),
                 Err(error) => {
                     self.source_failed(error, now);
@@ -82,6 +92,12 @@ impl Ready {
             Planned::RunStarted(position) => {
                 let homing = matches!(self.wait, Wait::Homing { .. });
                 let run = self.stream.start_run(position, &self.board, now, homing);
+                self.lease.forget();
+                if !homing && self.plans_job() {
+                    self.diary.run(run.start, &mut self.board);
+                } else {
+                    self.diary.other_run(&mut self.board);
+                }
                 if let Wait::Homing { axis, .. } = &mut self.wait {
                     let start = self.board.hardware_of(run.start, now);
                     axis.run_started(start, &mut self.board, now);
@@ -90,18 +106,7 @@ impl Ready {
             }
             Planned::Move(planned) => {
                 let Some(run) = self.stream.run() else { return Ok(true) };
-                let at = |time: f64| run.start + self.board.ticks(Seconds(time));
-                let scheduled = ScheduledMove {
-                    line: planned.tag,
-                    start: at(planned.start_time),
-                    end: at(planned.end_time()),
-                    from: planned.from,
-                    to: planned.to,
-                    speed: SpeedProfile::new(&planned, at),
-                    homing: run.homing,
-                };
-                self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
-                self.events.push(Event::Move(scheduled));
+                self.schedule_move(&planned, run);
             }
             Planned::Steps(command) => self.stream.push(&command, &mut self.board, now),
             Planned::Timed { at, line, action } => self.on_timed(at, line, action, now),
@@ -121,6 +126,22 @@ impl Ready {
             Planned::EndOfSource => self.finish_job(now),
         }
         Ok(true)
+    }
+
+    /// A move has its place on the motion clock.
+    pub(super) fn schedule_move(&mut self, planned: &PlannedMove, run: Run) {
+        let at = |time: f64| run.start + self.board.ticks(Seconds(time));
+        let scheduled = ScheduledMove {
+            line: planned.tag,
+            start: at(planned.start_time),
+            end: at(planned.end_time()),
+            from: planned.from,
+            to: planned.to,
+            speed: SpeedProfile::new(planned, at),
+            homing: run.homing,
+        };
+        self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
+        self.events.push(Event::Move(scheduled));
     }
 
     /// Notes what a job leaves behind.
@@ -188,7 +209,20 @@ impl Ready {
         {
             return false;
         }
-        self.planner.finish_run();
+        self.finish_run();
         true
+    }
+
+    /// Whether the planner plans the job, and nothing that is done meanwhile.
+    pub(super) fn plans_job(&self) -> bool {
+        self.job.as_ref().is_some_and(|job| job.paused.is_none())
+    }
+
+    /// Has the machine come to rest after what has been read.
+    fn finish_run(&mut self) {
+        let homing = matches!(self.wait, Wait::Homing { .. });
+        if self.planner.finish_run() && !homing && self.plans_job() {
+            self.diary.input(Input::FinishRun);
+        }
     }
 }
