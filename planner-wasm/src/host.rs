@@ -185,11 +185,17 @@ impl Host {
                 self.speeds.stop(*at);
             }
             Event::Temperature { .. } => {
-                if let Some(UiEvent::Temperature { heater, temperature_c, target_c, duty }) =
+                if let Some(UiEvent::Temperature { heater, temperature_c, target_c, duty, standby }) =
                     UiEvent::of(event)
                 {
                     self.temperatures.retain(|known| known.heater != heater);
-                    self.temperatures.push(TemperatureView { heater, temperature_c, target_c, duty });
+                    self.temperatures.push(TemperatureView {
+                        heater,
+                        temperature_c,
+                        target_c,
+                        duty,
+                        standby,
+                    });
                     self.temperatures.sort_by_key(|known| known.heater as u8);
                 }
             }

@@ -51,6 +51,9 @@ const ALL_STOPPED: &str =
 /// The host found it before or while printing and shut the board down.
 const STOPPED_BY_HOST: &str =
     "The board was told to stop: motors do not move and heaters are off. The print cannot go on from here.";
+/// The board or the host stopped it, whoever saw it first.
+const STOPPED: &str =
+    "Everything was stopped: motors do not move and heaters are off. The print cannot go on from here.";
 /// Refused before anything happened.
 const NOTHING_MOVED: &str = "Nothing was sent to the printer: it did not move and no heater was switched on.";
 /// One command refused in a running session.
@@ -77,10 +80,10 @@ catalogue! {
         "A temperature sensor reads above its max_temp: its wires touch, or the heater cannot be switched off", STOPPED_BY_HOST,
         "If anything still gets hotter, cut the printer's mains power now. Then check the sensor's cable and the heater's output. Restart the board only when it is cold.";
     HeaterNotHeating, "heater-not-heating":
-        "A heater was switched on but did not get warmer", STOPPED_BY_HOST,
+        "A heater was switched on but did not get warmer", STOPPED,
         "Check that the heater is connected and powered, and that its sensor sits firmly in the heater block or bed. Then restart the board.";
     HeaterDrifted, "heater-drifted":
-        "A heater does not reach or hold its temperature although it is being heated", STOPPED_BY_HOST,
+        "A heater does not reach or hold its temperature although it is being heated", STOPPED,
         "Check that the sensor has not come loose, that the heater's wires are sound, and that no fan blows at the block. Then restart the board.";
     TargetOutOfRange, "target-out-of-range":
         "A temperature outside the heater's limits was asked for", REFUSED,
@@ -250,7 +253,9 @@ impl From<ShutdownReason> for ErrorCode {
             R::TimerTooClose => Self::OrdersTooLate,
             R::TimerInPast | R::StepperTooFarInPast => Self::BoardTooSlow,
             R::MissedOutput => Self::HeaterUnattended,
-            R::AdcOutOfRange => Self::BoardSensorRange,
+            R::AdcOutOfRange | R::HeaterSensor => Self::BoardSensorRange,
+            R::HeaterNotHeating => Self::HeaterNotHeating,
+            R::HeaterDrifted => Self::HeaterDrifted,
             R::AlreadyConfigured => Self::ConfigMismatch,
             R::OutOfObjects => Self::BoardTooSmall,
             R::MoveQueueOverflow => Self::QueueOverflow,
@@ -268,7 +273,8 @@ impl From<ShutdownReason> for ErrorCode {
             | R::InvalidTrsync
             | R::InvalidEndstop
             | R::InvalidMotion
-            | R::MotionNotHeld => Self::ProtocolFault,
+            | R::MotionNotHeld
+            | R::InvalidHeater => Self::ProtocolFault,
         }
     }
 }

@@ -24,7 +24,7 @@ mod description;
 #[cfg(test)]
 mod tests;
 
-pub use description::{BLOCK_CHECK, BLOCK_CHECK_VERSION, Description, MOTION_CLOCK};
+pub use description::{BLOCK_CHECK, BLOCK_CHECK_VERSION, BOARD_HEATERS, Description, MOTION_CLOCK};
 
 /// The largest dictionary that is accepted once unpacked: real ones are below 64 KiB.
 pub const DICTIONARY_BYTES_MAX: usize = 1 << 20;

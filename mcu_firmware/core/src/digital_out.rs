@@ -9,6 +9,7 @@ use wire::ShutdownReason;
 
 use crate::{
     board::{Board, Pin},
+    heater::SHARE_ONE,
     motion_clock::MotionClock,
     moves::{MovePool, OutputMove, Queue},
     objects::After,
@@ -33,6 +34,10 @@ pub(crate) struct DigitalOut {
     /// output that is tied to it, which has no `max_duration`.
     load_at: Option<Clock32>,
     is_tied: bool,
+    /// A heater drives it, nobody else …
+    is_owned: bool,
+    /// … and wants it to be on for so long from the next cycle on.
+    next_on: Option<u32>,
     queue: Queue,
     last_queued: Clock32,
 }
@@ -61,6 +66,8 @@ impl DigitalOut {
             toggle_at: None,
             load_at: None,
             is_tied: false,
+            is_owned: false,
+            next_on: None,
             queue: Queue::new(),
             last_queued: Clock32(0),
         })
@@ -68,6 +75,7 @@ impl DigitalOut {
 
     /// Sets the period of the modulation, for the changes that are queued from now on.
     pub(crate) fn set_cycle(&mut self, cycle_ticks: u32) -> Result<(), ShutdownReason> {
+        self.check_free()?;
         if cycle_ticks > DURATION_TICKS_MAX || !self.queue.is_empty() {
             return Err(ShutdownReason::InvalidPwm);
         }
@@ -82,6 +90,47 @@ impl DigitalOut {
         }
         self.is_tied = true;
         Ok(())
+    }
+
+    /// Gives the output to a heater. It has to be modulated, off, and watched: the loop has to refresh it.
+    pub(crate) fn own(&mut self) -> Result<(), ShutdownReason> {
+        let is_fit = self.max_duration != 0 && self.cycle_ticks > 0 && self.queue.is_empty();
+        if !is_fit || self.level != self.default_level || self.is_owned {
+            return Err(ShutdownReason::InvalidHeater);
+        }
+        self.is_owned = true;
+        Ok(())
+    }
+
+    /// Whether the host may set it.
+    pub(crate) const fn check_free(&self) -> Result<(), ShutdownReason> {
+        if self.is_owned { Err(ShutdownReason::InvalidHeater) } else { Ok(()) }
+    }
+
+    /// On, which is away from the default, for a share of each cycle. Off is at once; another width begins with the next
+    /// cycle, so that none is cut short. Has to be called again within `max_duration`.
+    pub(crate) fn drive(&mut self, board: &mut impl Board, share: u32) {
+        let on = u64::from(self.cycle_ticks) * u64::from(share.min(SHARE_ONE));
+        let on = ((on + u64::from(SHARE_ONE / 2)) / u64::from(SHARE_ONE)) as u32;
+        let now = board.now();
+        if on == 0 {
+            self.toggle_at = None;
+            self.next_on = None;
+            self.set(board, self.default_level);
+        } else if self.toggle_at.is_some() {
+            self.next_on = Some(on);
+        } else {
+            self.begin_cycle(board, now, on);
+        }
+        self.load_at = self.limit_from(now);
+    }
+
+    /// On for so long, from this clock on.
+    fn begin_cycle(&mut self, board: &mut impl Board, clock: Clock32, on: u32) {
+        let off = self.cycle_ticks.saturating_sub(on);
+        (self.on_ticks, self.off_ticks) = if self.default_level { (off, on) } else { (on, off) };
+        self.set(board, !self.default_level);
+        self.toggle_at = (off > 0).then(|| clock.wrapping_add(on));
     }
 
     pub(crate) const fn is_tied(&self) -> bool {
@@ -154,6 +203,12 @@ impl DigitalOut {
         if self.load_due(motion) == Some(wake) {
             self.load(board, moves, wake)?;
         } else if self.toggle_at == Some(wake) {
+            if self.level == self.default_level
+                && let Some(on) = self.next_on.take()
+            {
+                self.begin_cycle(board, wake, on);
+                return Ok(self.wake(motion).map_or(After::Done, After::Again));
+            }
             self.set(board, !self.level);
             self.toggle_at = Some(wake.wrapping_add(if self.level { self.on_ticks } else { self.off_ticks }));
         }
@@ -200,6 +255,7 @@ impl DigitalOut {
     pub(crate) fn shut_down(&mut self, board: &mut impl Board) {
         self.queue = Queue::new();
         self.toggle_at = None;
+        self.next_on = None;
         self.load_at = None;
         self.set(board, self.default_level);
     }

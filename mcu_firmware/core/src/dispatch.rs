@@ -1,7 +1,7 @@
 //! What each command does. Bad values and bad timing are returned as the reason to shut down.
 
 use units::Clock32;
-use wire::{Command, Response, ShutdownReason};
+use wire::{Command, Response, ShutdownReason, messages::Extension};
 
 use crate::{
     analog_in::{AnalogIn, Sampling},
@@ -24,8 +24,12 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         board: &mut impl Board,
         command: Command<'_>,
     ) -> Result<(), ShutdownReason> {
-        if command.kind().is_extension() {
-            return self.dispatch_motion(board, &command);
+        match command.kind().extension() {
+            None => {}
+            Some(Extension::Heaters) => return self.dispatch_heater(board, &command),
+            Some(Extension::MotionClock) => return self.dispatch_motion(board, &command),
+            // What a block may end in is nothing to be done, and unknown to a board without the block check.
+            Some(Extension::BlockCheck) => return Err(ShutdownReason::CommandParser),
         }
         match command {
             Command::Identify { .. }
@@ -228,6 +232,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             Command::QueryAnalogIn { .. } => self.sample(board, command),
             Command::QueueDigitalOut { oid, clock, on_ticks } => {
                 let output = self.objects.digital_out(oid)?;
+                output.check_free()?;
                 let change = OutputMove { clock, on_ticks };
                 output.queue(board.now(), &mut self.moves, &self.hold.clock, change)?;
                 let wake = output.wake(&self.hold.clock);
@@ -236,6 +241,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             }
             Command::UpdateDigitalOut { oid, value } => {
                 let output = self.objects.digital_out(oid)?;
+                output.check_free()?;
                 output.update(board, &mut self.moves, value != 0);
                 let wake = output.wake(&self.hold.clock);
                 self.reset_output_timer(oid, wake);
@@ -321,6 +327,11 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         else {
             return Ok(());
         };
+        // Another number of readings would give the heater another temperature.
+        let is_other = |count| sample_count != 0 && sample_count != count;
+        if self.heaters.fed_by(oid).is_some_and(|heater| is_other(heater.wiring.sample_count)) {
+            return Err(ShutdownReason::InvalidHeater);
+        }
         let clock = Clock32(clock);
         let sampling = Sampling {
             sample_ticks,

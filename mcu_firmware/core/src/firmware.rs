@@ -8,6 +8,7 @@ use wire::{
 
 use crate::{
     board::Board,
+    heater::Heaters,
     hold::Hold,
     moves::MovePool,
     objects::{After, Object, Objects},
@@ -48,13 +49,31 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
         self
     }
 
-    /// As a board with plain Klipper firmware: the motion clock is the hardware clock, and the commands of our
-    /// extensions do not exist.
+    /// Without a motion clock: it is the hardware clock, and its commands do not exist.
     #[must_use]
-    pub const fn plain(mut self) -> Self {
+    pub const fn without_motion_clock(mut self) -> Self {
         self.core.has_motion_clock = false;
+        self
+    }
+
+    /// As a board that leaves temperature loops to its host.
+    #[must_use]
+    pub const fn without_heaters(mut self) -> Self {
+        self.core.has_heaters = false;
+        self
+    }
+
+    /// As a board that knows no check over blocks but the framing's own.
+    #[must_use]
+    pub const fn without_block_check(mut self) -> Self {
         self.core.receiver.without_check();
         self
+    }
+
+    /// As a board with plain Klipper firmware, which has none of these.
+    #[must_use]
+    pub const fn plain(self) -> Self {
+        self.without_motion_clock().without_heaters().without_block_check()
     }
 
     /// Takes bytes from the host, in pieces of any size: answers and obeys.
@@ -71,7 +90,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
     /// never let up are left alone for a moment after a tenth of a millisecond, so that the main loop still runs.
     ///
     /// Called from the timer interrupt on a chip, by the event loop in a simulation; and whenever bytes have been
-    /// received, since they may have started an earlier timer.
+    /// received and tasks have run, since they may have started an earlier timer.
     pub fn run_timers(&mut self, board: &mut impl Board) -> Clock32 {
         self.core.run_timers(board)
     }
@@ -109,6 +128,8 @@ pub(crate) struct Core<const OBJECTS: usize, const MOVES: usize> {
     pub(crate) halt: Halt,
     pub(crate) hold: Hold,
     pub(crate) has_motion_clock: bool,
+    pub(crate) heaters: Heaters,
+    pub(crate) has_heaters: bool,
     /// The host's mark of the job whose rows are counted.
     pub(crate) job: u32,
     /// The host's mark of the configuration, once that is complete.
@@ -133,6 +154,8 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             halt: Halt::new(),
             hold: Hold::new(clock),
             has_motion_clock: true,
+            heaters: Heaters::new(clock),
+            has_heaters: true,
             job: 0,
             config_crc: None,
             uptime: Uptime::new(),
@@ -238,8 +261,11 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         self.look_at = self.stats.look(now);
         self.hold.advance(now);
         self.reports_pending |= self.hold.report_pending;
-        if let Some(at) = self.hold.event_at().filter(|at| at.is_before(self.look_at)) {
-            self.look_at = at;
+        self.heaters.look(now);
+        for at in [self.hold.event_at(), self.heaters.event_at()].into_iter().flatten() {
+            if at.is_before(self.look_at) {
+                self.look_at = at;
+            }
         }
         if self.hold.take_retime() {
             self.retime();
@@ -274,6 +300,9 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             Some(Object::AnalogIn(input)) => {
                 let after = input.event(board, wake);
                 self.reports_pending |= input.report_pending;
+                if let Some(sum) = input.take_sum() {
+                    self.heaters.feed(oid, sum);
+                }
                 after
             }
             Some(Object::Trsync(trsync)) => {
@@ -282,7 +311,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
                 let next = trsync.wake().map_or(After::Done, After::Again);
                 Ok(if let Due::Expired(reason) = due { After::Fire { trsync: oid, reason } } else { next })
             }
-            Some(Object::Stepper(_) | Object::Free) | None => Ok(After::Done),
+            Some(Object::Stepper(_) | Object::Heater | Object::Free) | None => Ok(After::Done),
         };
         match after {
             Ok(After::Again(next)) => self.timers.reschedule_first(next),
@@ -348,6 +377,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     pub(crate) fn forget(&mut self, board: &mut impl Board) {
         self.stop_everything(board);
         self.objects.clear();
+        self.heaters = Heaters::new(self.clock);
         self.config_crc = None;
         self.job = 0;
         self.halt.leave();
@@ -356,6 +386,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     fn stop_everything(&mut self, board: &mut impl Board) {
         self.timers.clear();
         self.objects.shut_down(board);
+        self.heaters.shut_down();
         self.moves.reset();
         self.hold = Hold::new(self.clock);
         self.reports_pending = false;
@@ -376,6 +407,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         self.starting
             || self.halt.announce
             || self.reports_pending
+            || self.heaters.is_due
             || self.stats.pending
             || self.receiver.is_ack_pending()
     }
@@ -394,6 +426,9 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         if self.reports_pending {
             self.reports_pending = false;
             self.report(board);
+        }
+        if self.heaters.is_due {
+            self.run_heaters(board);
         }
         if self.hold.report_pending {
             self.hold.report_pending = false;

@@ -379,7 +379,9 @@ impl<R: Recorder> VirtualPrinter<R> {
 
 fn new_firmware(profile: &BoardProfile) -> Box<Firmware<OBJECTS_MAX, MOVES_MAX>> {
     let firmware = Firmware::new(profile.clock).with_move_count(profile.move_count);
-    Box::new(if profile.extensions { firmware } else { firmware.plain() })
+    let firmware = if profile.motion_clock { firmware } else { firmware.without_motion_clock() };
+    let firmware = if profile.block_check { firmware } else { firmware.without_block_check() };
+    Box::new(if profile.board_heaters { firmware } else { firmware.without_heaters() })
 }
 
 fn motor_view(axis: &Axis) -> MotorView {

@@ -30,9 +30,12 @@ pub struct BoardProfile {
     pub clock_at_start: Ticks,
     /// What a restart of the firmware takes; a USB board is gone from the bus in the meantime.
     pub restart: Seconds,
-    /// Whether the firmware has our extensions: the motion clock and the block check. Without them the board is as one
-    /// with plain Klipper firmware.
-    pub extensions: bool,
+    /// Whether the firmware has our motion clock.
+    pub motion_clock: bool,
+    /// Whether the firmware regulates heaters.
+    pub board_heaters: bool,
+    /// Whether the firmware knows the block check. Without all three the board is as one with plain Klipper firmware.
+    pub block_check: bool,
 }
 
 /// Most moves that any board's queue holds.
@@ -73,7 +76,7 @@ impl BoardProfile {
     /// The same board with plain Klipper firmware: without our extensions.
     #[must_use]
     pub fn plain(self) -> Self {
-        Self { extensions: false, ..self }
+        Self { motion_clock: false, board_heaters: false, block_check: false, ..self }
     }
 
     /// Every board.
@@ -94,7 +97,9 @@ impl BoardProfile {
             link: LinkProfile::Usb,
             clock_at_start: before_the_wrap(clock),
             restart: Seconds(0.5),
-            extensions: true,
+            motion_clock: true,
+            board_heaters: true,
+            block_check: true,
         }
     }
 
@@ -111,7 +116,9 @@ impl BoardProfile {
             link: LinkProfile::Uart { baud: 250_000, receive_window: 192 },
             clock_at_start: before_the_wrap(clock),
             restart: Seconds(0.1),
-            extensions: true,
+            motion_clock: true,
+            board_heaters: true,
+            block_check: true,
         }
     }
 
@@ -149,8 +156,9 @@ impl BoardProfile {
             build_versions: "virtual".to_owned(),
             constants,
             pins: self.pins.iter().map(|&(name, first, count)| (name.to_owned(), first, count)).collect(),
-            motion_clock: self.extensions,
-            block_check: self.extensions,
+            motion_clock: self.motion_clock,
+            board_heaters: self.board_heaters,
+            block_check: self.block_check,
         }
     }
 }

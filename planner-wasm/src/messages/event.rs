@@ -103,6 +103,8 @@ pub enum UiEvent {
         target_c: f64,
         /// The share of time that it is on.
         duty: f64,
+        /// The board has lowered it, or switched it off, because it was out of touch with its host.
+        standby: bool,
     },
     /// An axis found its endstop.
     Homed {
@@ -161,11 +163,12 @@ impl UiEvent {
             Event::Identified { version, mcu, clock_freq } => {
                 Self::Identified { version: version.clone(), mcu: mcu.clone(), clock_freq_hz: *clock_freq }
             }
-            Event::Temperature { heater, temperature, target, duty } => Self::Temperature {
+            Event::Temperature { heater, temperature, target, duty, standby } => Self::Temperature {
                 heater: HeaterName::of(*heater)?,
                 temperature_c: temperature.0,
                 target_c: target.0,
                 duty: *duty,
+                standby: *standby,
             },
             Event::Homed { axis, position_mm, .. } => {
                 Self::Homed { axis: *axis as u8, position_mm: *position_mm }
@@ -208,9 +211,11 @@ mod tests {
             temperature: Celsius(59.5),
             target: Celsius(60.0),
             duty: 0.25,
+            standby: false,
         };
         let expected = serde_json::json!({
-            "type": "temperature", "heater": "heater_bed", "temperature_c": 59.5, "target_c": 60.0, "duty": 0.25
+            "type": "temperature", "heater": "heater_bed", "temperature_c": 59.5, "target_c": 60.0, "duty": 0.25,
+            "standby": false
         });
         assert_eq!(json(&reading), expected);
         let progress = json(&Event::Progress { line: 7, elapsed: Seconds(1.5) });

@@ -61,6 +61,8 @@ pub struct TemperatureView {
     pub target_c: f64,
     /// The share of time that it is on.
     pub duty: f64,
+    /// The board has lowered it, or switched it off, because it was out of touch with its host.
+    pub standby: bool,
 }
 
 /// What a job is doing.

@@ -183,7 +183,11 @@ class WasmSession implements Session {
 
   startJob(confirmedLines: ConfirmedLines, now: Seconds): Trouble | null {
     const isAll = confirmedLines === 'all';
-    const request: JobRequest = { confirmed_lines: isAll ? [] : [...confirmedLines], confirm_all: isAll };
+    const request: JobRequest = {
+      confirmed_lines: isAll ? [] : [...confirmedLines],
+      confirm_all: isAll,
+      journal: null,
+    };
     return refusal(() => this.#inner.start_job(JSON.stringify(request), now));
   }
 

@@ -32,6 +32,8 @@ export type Phase =
   | 'synchronising'
   | 'restarting'
   | 'configuring'
+  /** The board holds a print whose page is gone. */
+  | 'holding'
   | 'ready'
   | 'shutdown'
   | 'failed';

@@ -3,6 +3,7 @@
 import type { AnswerKind } from '../transport/answer';
 import { PortError, type PortFailureCode } from '../transport/transport';
 import type { Trouble } from './protocol';
+import type { StorageCode } from './storage';
 
 const NOTHING_MOVED = 'Nothing was sent to the printer: it did not move and no heater was switched on.';
 const ON_ITS_OWN =
@@ -174,4 +175,36 @@ const ANSWERS: Partial<Record<AnswerKind, readonly [string, string]>> = {
 export function answerTrouble(answer: AnswerKind, code: string): Trouble | null {
   const words = ANSWERS[answer];
   return words ? trouble(code, words[0], NOTHING_MOVED, words[1]) : null;
+}
+
+const NOT_KEPT = 'The print itself is not touched; but it could not be continued after this page is gone.';
+const STORAGE: Record<StorageCode, readonly [string, string]> = {
+  unavailable: [
+    'The browser keeps no files for this page.',
+    'Open the page in an ordinary window, and allow it to store data.',
+  ],
+  full: [
+    'There is no room to keep the print.',
+    'Free space on this computer\u2019s disk, or delete old prints here.',
+  ],
+  'in-use': ['Another tab has this print open.', 'Go on in that tab, or close it.'],
+  missing: ['This print is not kept any more.', 'Start it anew from its file.'],
+  incomplete: ['The copy of the print\u2019s file is not whole.', 'Open the file again.'],
+  'too-long': ['The journal of the print has grown too long.', 'Start the print anew from its file.'],
+  broken: [
+    'The browser\u2019s storage does not work.',
+    'Reload the page. If it stays so, clear the data of this site in the browser\u2019s settings.',
+  ],
+};
+
+/** Something about a print's journal or file that could not be kept or read. */
+export function storageTrouble(code: StorageCode, error: unknown): Trouble {
+  const [happened, todo] = STORAGE[code];
+  const text = detail(error);
+  return trouble(
+    `storage-${code}`,
+    text && text !== code ? `${happened} (${text})` : happened,
+    NOT_KEPT,
+    todo,
+  );
 }

@@ -28,6 +28,7 @@ const JOBS = {
 export function statusOf(phase: Phase, job: JobStatus): Status {
   if (phase === 'ready') return { text: JOBS[job], tone: 'good' };
   if (phase === 'shutdown') return { text: 'Stopped', tone: 'bad' };
+  if (phase === 'holding') return { text: 'Holding a print', tone: 'busy' };
   return phase === 'failed' ? { text: 'Failed', tone: 'bad' } : { text: 'Connecting', tone: 'busy' };
 }
 
@@ -77,7 +78,11 @@ export function TopBar(): JSX.Element {
       </p>
       <nav class="top-actions" aria-label="Page">
         {isClosed ? (
-          <Button icon="plug" kind="primary" onClick={() => (openDialog.value = 'connect')}>
+          <Button
+            icon="plug"
+            kind={isViewing.value ? 'plain' : 'primary'}
+            onClick={() => (openDialog.value = 'connect')}
+          >
             Connect
           </Button>
         ) : (

@@ -40,6 +40,8 @@ export const isStale = signal(false);
 export const outcome = signal<'done' | 'cancelled' | 'stopped' | null>(null);
 
 export const isReady = computed(() => connection.value === 'open' && snapshot.value?.phase === 'ready');
+/** The board holds a print whose page is gone. */
+export const isHolding = computed(() => connection.value === 'open' && snapshot.value?.phase === 'holding');
 export const isShutdown = computed(() => connection.value === 'open' && snapshot.value?.phase === 'shutdown');
 export const job = computed(() => (isReady.value ? (snapshot.value?.job ?? 'none') : 'none'));
 export const isPrinting = computed(() => job.value !== 'none');
@@ -188,6 +190,7 @@ const PHASES: Record<Snapshot['phase'], string> = {
   synchronising: 'Measuring the board\u2019s clock.',
   restarting: 'The board restarts.',
   configuring: 'Setting up the board.',
+  holding: 'The board holds a print whose page is gone.',
   ready: 'The printer is ready.',
   shutdown: 'The board has stopped.',
   failed: 'The connection failed.',

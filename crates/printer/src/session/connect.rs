@@ -12,7 +12,7 @@ use super::{
     board::{Board, Losses},
     event::{Event, PhaseName},
     inbox::{self, Message},
-    layout::Layout,
+    layout::{self, Layout},
     motion_time::MotionTime,
 };
 use crate::{
@@ -28,8 +28,6 @@ use crate::{
 const ASK_AGAIN: Seconds = Seconds(0.25);
 /// A board that was asked to restart gets this long before it is spoken to.
 const RESTART: Seconds = Seconds(1.0);
-/// Converters' full scale where the board does not say.
-const ADC_MAX_DEFAULT: f64 = 4095.0;
 /// Eight readings are added up in 16 bits.
 const ADC_MAX_MAX: f64 = 8191.0;
 /// A board that has not taken its configuration in after this long never will.
@@ -206,7 +204,7 @@ impl Connecting {
         if !(1000.0..=1e9).contains(&clock_freq) {
             return Err(wrong("the board's CLOCK_FREQ makes no sense"));
         }
-        let adc_max = dictionary.number("ADC_MAX").unwrap_or(ADC_MAX_DEFAULT);
+        let adc_max = layout::adc_max(&dictionary);
         if !(1.0..=ADC_MAX_MAX).contains(&adc_max) {
             return Err(wrong("the board's ADC_MAX makes no sense"));
         }

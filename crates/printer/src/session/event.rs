@@ -80,6 +80,8 @@ pub enum Event {
         target: Celsius,
         /// The share of time that it is on.
         duty: f64,
+        /// The board has lowered it, or switched it off, because its host fell silent.
+        standby: bool,
     },
     /// A run of motion starts at this motion clock and position.
     RunStarted {

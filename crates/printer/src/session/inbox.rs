@@ -6,7 +6,7 @@ use wire::{
     dictionary::{Dictionary, Received},
 };
 
-use super::motion_time::MotionReport;
+use super::{board_heater::HeaterReport, motion_time::MotionReport};
 use crate::{journal::MotorQueue, link::Link};
 
 /// A message from the board, without borrowed bytes.
@@ -21,6 +21,7 @@ pub(super) enum Message {
     Analog { oid: u8, next_clock: Clock32, sum: u16 },
     Motion(MotionReport),
     Queue { oid: u8, job: u32, queue: MotorQueue },
+    Heater(HeaterReport),
     Shutdown { reason: u16 },
     Starting,
 }
@@ -86,6 +87,9 @@ fn message(response: &Response<'_>) -> Option<Message> {
                 crc,
             },
         },
+        Response::HeaterState { oid, target, power, state, .. } => {
+            Message::Heater(HeaterReport::new(oid, target, power, state))
+        }
         Response::Stats { .. } | Response::IdentifyResponse { .. } | Response::BlockChecked { .. } => {
             return None;
         }

@@ -69,6 +69,8 @@ pub(super) struct Paused {
     pub(super) homed: [bool; 3],
     /// The nozzle was hot enough.
     pub(super) could_extrude: bool,
+    /// What the heaters were set to.
+    pub(super) targets: Vec<(gcode::Heater, units::Celsius)>,
 }
 
 /// A print.

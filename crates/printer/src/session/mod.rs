@@ -9,6 +9,7 @@
 
 mod attach;
 mod board;
+mod board_heater;
 mod connect;
 mod console;
 mod diary;

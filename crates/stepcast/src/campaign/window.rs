@@ -27,8 +27,6 @@ pub(super) struct Window {
     /// Where it is from, for messages.
     pub(super) name: String,
     pub(super) gcode: Arc<[u8]>,
-    /// It heats the nozzle.
-    pub(super) heats: bool,
     /// It wants the highest accelerations.
     pub(super) fast: bool,
 }
@@ -113,7 +111,7 @@ impl Source {
         }
         text.push_str("M107\nM104 S0\nM140 S0\nM84\n");
         let name = format!("{} from line {}", self.name, at.line + 1);
-        Window { name, gcode: text.into_bytes().into(), heats: true, fast: false }
+        Window { name, gcode: text.into_bytes().into(), fast: false }
     }
 }
 
@@ -200,7 +198,7 @@ pub(super) fn fast(chance: &mut Chance) -> Window {
         }
     }
     text.push_str("M84\n");
-    Window { name: "fast to and fro".to_owned(), gcode: text.into_bytes().into(), heats: false, fast: true }
+    Window { name: "fast to and fro".to_owned(), gcode: text.into_bytes().into(), fast: true }
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ use printer::{
     machine::{EXTRUDER, MOTOR_NAMES},
     session::{JobOptions, JobStatus, Request, Session},
 };
-use units::{Hertz, Seconds, Ticks};
-use virtual_printer::{BoardProfile, Faults, HostStall, State, VirtualPrinter};
+use units::{Celsius, Hertz, Seconds, Ticks};
+use virtual_printer::{BoardProfile, Faults, HeaterView, HostStall, State, VirtualPrinter};
 
 use super::{
     lease_tap::LeaseTap,
@@ -42,6 +42,8 @@ const SAMPLE_INTERVAL: Seconds = Seconds(0.1);
 const EXTRUDING: Seconds = Seconds(0.25);
 /// The path may be this far off, or by a step of each axis where that is more.
 pub(crate) const PATH_ERROR_MAX_MM: f64 = 0.02;
+/// A heater that is held at its stand-by is this much above it at times.
+const STANDBY_BAND_C: f64 = 5.0;
 /// The progress bar is drawn this often, in rounds of the loop.
 const ROUNDS_PER_DRAW: u32 = 256;
 
@@ -111,6 +113,8 @@ pub(crate) struct Aftermath {
     pub(crate) last_step: Option<Ticks>,
     /// When a heater was on last.
     pub(crate) heated: Ticks,
+    /// When one was on last that was warmer than its stand-by.
+    pub(crate) overheated: Ticks,
     /// Motion that began again without the user's word after a hold was shown.
     pub(crate) restarts: u32,
     /// The end of the job, before the machine was watched.
@@ -141,6 +145,8 @@ pub(crate) struct Simulation {
     stage: Stage,
     watched: Seconds,
     quiet: bool,
+    /// The temperatures at which heaters are safe without a host.
+    standby: [(&'static str, Celsius); 2],
     lease: LeaseTap,
     aftermath: Aftermath,
     next_sample: Ticks,
@@ -164,6 +170,11 @@ impl Simulation {
         let start = printer.start();
         let clock = HostClock::new(start, host_hz);
         let [x, y, z, _] = step_distances;
+        let standby = [
+            ("extruder", config.extruder.as_ref().map(|extruder| extruder.heater.standby_temp)),
+            ("heater_bed", config.heater_bed.as_ref().map(|bed| bed.standby_temp)),
+        ]
+        .map(|(name, standby)| (name, standby.unwrap_or(Celsius(0.0))));
         Ok(Self {
             observer: Observer::new(&config, reference, start, quiet),
             session: Session::new(config, clock.at(printer.now())),
@@ -179,6 +190,7 @@ impl Simulation {
             stage: Stage::Connecting,
             watched,
             quiet,
+            standby,
             lease: LeaseTap::default(),
             aftermath: Aftermath { start, ..Aftermath::default() },
             next_sample: start,
@@ -333,8 +345,16 @@ impl Simulation {
             tally.path.settle(motion_now);
         }
         let extruding = tally.extruded_at.is_some_and(|at| at + extruding >= now);
-        if state.heaters.iter().any(|heater| heater.duty > 0.0) {
+        let is_hot = |heater: &&HeaterView| {
+            let standby = self.standby.iter().find(|(name, _)| *name == heater.name);
+            standby.is_none_or(|(_, standby)| heater.temperature.0 > standby.0 + STANDBY_BAND_C)
+        };
+        let mut heated = state.heaters.iter().filter(|heater| heater.duty > 0.0).peekable();
+        if heated.peek().is_some() {
             self.aftermath.heated = now;
+        }
+        if heated.any(|heater| is_hot(&heater)) {
+            self.aftermath.overheated = now;
         }
         let time = self.clock.at(now);
         if self.stage == Stage::Printing

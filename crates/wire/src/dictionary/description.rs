@@ -21,6 +21,8 @@ pub struct Description {
     pub pins: Vec<(String, u8, u8)>,
     /// Whether the board has the motion clock: its messages, and the constant [`MOTION_CLOCK`].
     pub motion_clock: bool,
+    /// Whether the board regulates heaters: the messages for that, and the constant [`BOARD_HEATERS`].
+    pub board_heaters: bool,
     /// Whether the board knows the block check: its messages, and the constant [`BLOCK_CHECK`].
     pub block_check: bool,
 }
@@ -29,6 +31,10 @@ pub struct Description {
 pub const MOTION_CLOCK: &str = "MOTION_CLOCK";
 /// The version that is described in docs/motion-clock.md.
 const MOTION_CLOCK_VERSION: f64 = 1.0;
+/// The constant by which a board says that it regulates heaters: the extension's version.
+pub const BOARD_HEATERS: &str = "BOARD_HEATERS";
+/// The version that is described in docs/board-heaters.md.
+const BOARD_HEATERS_VERSION: f64 = 1.0;
 /// The constant by which a board says that it knows the block check: the extension's version.
 pub const BLOCK_CHECK: &str = "BLOCK_CHECK";
 /// The version that is described in docs/block-check.md.
@@ -39,6 +45,7 @@ impl Description {
         match extension {
             None => true,
             Some(Extension::MotionClock) => self.motion_clock,
+            Some(Extension::Heaters) => self.board_heaters,
             Some(Extension::BlockCheck) => self.block_check,
         }
     }
@@ -60,6 +67,7 @@ impl Description {
             .map(|&reason| (reason.text().to_owned(), EnumerationValue::One(i64::from(reason as u16))));
         let versions = [
             (Extension::MotionClock, MOTION_CLOCK, MOTION_CLOCK_VERSION),
+            (Extension::Heaters, BOARD_HEATERS, BOARD_HEATERS_VERSION),
             (Extension::BlockCheck, BLOCK_CHECK, BLOCK_CHECK_VERSION),
         ];
         let extensions = versions

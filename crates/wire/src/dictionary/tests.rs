@@ -13,6 +13,7 @@ fn ours() -> Dictionary {
         ],
         pins: vec![("gpio0".into(), 0, 30), ("LED".into(), 40, 1)],
         motion_clock: true,
+        board_heaters: true,
         block_check: true,
     };
     Dictionary::parse(&description.compressed()).unwrap()

@@ -183,9 +183,10 @@ impl Bench {
     /// Lets time pass, as a timer interrupt would see it.
     pub(crate) fn run_until(&mut self, until: u64) {
         loop {
-            let next = self.firmware.run_timers(&mut self.board);
+            let mut next = self.firmware.run_timers(&mut self.board);
             if self.firmware.has_tasks() {
                 self.firmware.run_tasks(&mut self.board);
+                next = self.firmware.run_timers(&mut self.board);
             }
             let next = Ticks(self.board.now).nearest(next).0;
             assert!(next > self.board.now, "a timer that was due did not run");

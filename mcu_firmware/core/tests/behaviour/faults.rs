@@ -171,7 +171,7 @@ fn every_fault_stops_the_board() {
 
 #[test]
 fn the_cases_cover_every_reason_but_those_tested_on_their_own() {
-    // Configuration and parser faults, a late timer; and trsync parameters, none of which are invalid.
+    // Configuration and parser faults, a late timer, heaters; and trsync parameters, none of which are invalid.
     let elsewhere = [
         ShutdownReason::TimerInPast,
         ShutdownReason::CommandParser,
@@ -181,6 +181,10 @@ fn the_cases_cover_every_reason_but_those_tested_on_their_own() {
         ShutdownReason::InvalidPin,
         ShutdownReason::InvalidAdcPin,
         ShutdownReason::InvalidTrsync,
+        ShutdownReason::InvalidHeater,
+        ShutdownReason::HeaterSensor,
+        ShutdownReason::HeaterNotHeating,
+        ShutdownReason::HeaterDrifted,
     ];
     for reason in ShutdownReason::ALL {
         let is_case = cases().iter().any(|case| case.0 == *reason);

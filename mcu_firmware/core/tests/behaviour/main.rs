@@ -3,6 +3,7 @@
 mod bench;
 mod block_check;
 mod faults;
+mod heaters;
 mod hold;
 mod homing;
 mod inputs;

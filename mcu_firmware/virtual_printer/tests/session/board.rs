@@ -1,6 +1,6 @@
 //! The board as a host meets it: dictionary, clock, sensors, heaters, the link and its faults.
 
-use crate::host::{Host, machine};
+use crate::host::{Answer, Host, machine};
 use proptest::prelude::*;
 use units::{Celsius, Seconds};
 use virtual_printer::{BoardProfile, Faults, Machine, Recorder, Sensor, VirtualPrinter, WiringError};

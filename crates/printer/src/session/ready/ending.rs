@@ -5,7 +5,7 @@ use units::Seconds;
 use super::{Held, Ready, Wait};
 use crate::{
     error::{Ended, ErrorCode, PrinterError},
-    planner::{ExtrusionPermit, Planner, Position},
+    planner::{ExtrusionPermit, Planner},
     session::{
         event::Event,
         job::{Job, JobState, JobStatus, Paused, RETURN_FEED},
@@ -41,6 +41,15 @@ impl Ready {
     fn switch_off(&mut self, now: Seconds) {
         self.thermal.all_off(&mut self.board, now);
         self.thermal.set_fan(0.0, None, &mut self.board, now);
+    }
+
+    /// What was typed and not yet done is not done, and waits no longer.
+    pub(super) fn stop_typed(&mut self) {
+        if self.is_console_busy() {
+            self.planner.drop_barrier();
+            self.forget_console();
+            self.stop_waiting();
+        }
     }
 
     /// Nothing is waited for any more; an axis that is being homed stops.
@@ -90,7 +99,7 @@ impl Ready {
         let Some(paused) = paused.and_then(|job| job.paused.as_ref()) else {
             return Err(PrinterError::new(ErrorCode::NoJob, "no job is paused"));
         };
-        let Paused { position, homed: was_homed, could_extrude, .. } = *paused;
+        let Paused { homed: was_homed, could_extrude, .. } = *paused;
         if self.is_console_busy() {
             return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
         }
@@ -101,11 +110,13 @@ impl Ready {
                 "the position was lost while the job was paused",
             ));
         }
-        if let (true, ExtrusionPermit::TooCold { celsius }) = (could_extrude, self.extrusion_permit()) {
-            let detail = format!("the nozzle has cooled to {celsius:.0} °C while the job was paused");
-            return Err(PrinterError::new(ErrorCode::ColdExtrusion, detail));
+        let targets = paused.targets.clone();
+        let heats = self.heat_again(&targets, could_extrude, false, now)?;
+        if heats {
+            self.wait = Wait::Heat;
+        } else {
+            self.go_back()?;
         }
-        self.go_back(position, was_homed)?;
         if let Some(job) = &mut self.job {
             job.state = JobState::Returning;
         }
@@ -115,7 +126,9 @@ impl Ready {
 
     /// Across first, at the greater height, then down: nothing is hit on the way. The filament stays as it is, and so
     /// does an axis whose position was not known then.
-    fn go_back(&mut self, position: Position, was_homed: [bool; 3]) -> Result<(), PrinterError> {
+    pub(super) fn go_back(&mut self) -> Result<(), PrinterError> {
+        let Some(paused) = self.job.as_ref().and_then(|job| job.paused.as_ref()) else { return Ok(()) };
+        let Paused { position, homed: was_homed, .. } = *paused;
         let here = self.planner.position();
         let [x, y, z] =
             core::array::from_fn(|axis| if was_homed[axis] { position[axis] } else { here[axis] });
@@ -157,10 +170,11 @@ impl Ready {
         aside.stand_at(position);
         (0..3).for_each(|axis| aside.guard.set_homed(axis, homed[axis]));
         let could_extrude = self.extrusion_permit() == ExtrusionPermit::Allowed;
+        let targets = self.thermal.wanted();
         let planner = Box::new(core::mem::replace(&mut self.planner, aside));
         if let Some(job) = &mut self.job {
             job.state = JobState::Paused;
-            job.paused = Some(Paused { planner, position, homed, could_extrude });
+            job.paused = Some(Paused { planner, position, homed, could_extrude, targets });
         }
         self.last_active = now;
         self.console.clear();

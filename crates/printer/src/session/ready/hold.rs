@@ -1,14 +1,14 @@
 //! Motion that the board has brought to rest on its path because its host was held up: nothing is lost, and nothing goes
 //! on before the user says so.
 //!
-//! The way on is with the very next step; the way out drops the board's queue and reads where the motors stand. Heaters
-//! are the host's business meanwhile, as ever: a board that gets no orders for a heater shuts down by itself, and then
-//! nothing is held any more.
+//! The way on is with the very next step; the way out drops the board's queue and reads where the motors stand. A board
+//! that regulates its heaters lowers them to stand-by meanwhile: to go on is to heat again first. On other boards a heater
+//! that gets no orders shuts everything down, and then nothing is held any more.
 
 use units::{Celsius, Seconds, Ticks};
 use wire::Command;
 
-use super::{Failure, Ready, take_up::Rest};
+use super::{Failure, Ready, Wait, take_up::Rest};
 use crate::{
     error::{ErrorCode, PrinterError},
     journal::MotorQueue,
@@ -37,6 +37,8 @@ const COOLED_MAX_C: f64 = 10.0;
 const COVER_SPARE: Seconds = Seconds(0.3);
 /// A pause between two calls that is worth telling.
 const GAP_MIN: Seconds = Seconds(0.5);
+/// After one so long, what was not heard of meanwhile is not silence.
+const GAP_LONG: Seconds = Seconds(3.0);
 
 /// How far a hold is.
 #[derive(Clone, Debug)]
@@ -45,9 +47,11 @@ enum Phase {
     Slowing,
     /// At rest: the user decides.
     AtRest,
-    /// The user wants to go on with what another host began: the board drops what it has, and gets it again.
+    /// The user wants to go on: what has cooled is heated again.
+    Heating,
+    /// Hot enough, with what another host began: the board drops what it has, and gets it again.
     Rejoining { since: Seconds, asked: Seconds, answered: [bool; MOTORS] },
-    /// The user wants to go on; since when the board has been told, if it has.
+    /// It may go on; since when the board has been told, if it has.
     Resuming(Option<Ticks>),
     /// The user wants to end it: the queue is dropped, and each motor says where it stands.
     Dropping { since: Seconds, asked: Seconds, counts: [Option<i32>; MOTORS] },
@@ -63,10 +67,24 @@ pub(super) struct Hold {
     /// The nozzle's temperature then, and whether it was hot enough to push filament.
     nozzle: Option<Celsius>,
     could_extrude: bool,
+    /// What the heaters were set to.
+    targets: Vec<(gcode::Heater, Celsius)>,
     /// The user has been told.
     is_told: bool,
     /// What the board has to be given again, where another host began.
     rest: Option<Box<Rest>>,
+}
+
+impl Hold {
+    /// What comes once it is warm enough.
+    const fn warm(&self, now: Seconds) -> Phase {
+        match &self.rest {
+            Some(_) => {
+                Phase::Rejoining { since: now, asked: Seconds(f64::NEG_INFINITY), answered: [false; MOTORS] }
+            }
+            None => Phase::Resuming(None),
+        }
+    }
 }
 
 /// When the session was last called, and the longest pause since then that it has noticed.
@@ -77,9 +95,11 @@ pub(super) struct Calls {
 }
 
 impl Calls {
-    pub(super) fn note(&mut self, now: Seconds) {
+    /// Notes a call. Whether it comes after a long pause.
+    pub(super) fn note(&mut self, now: Seconds) -> bool {
         let gap = self.last.replace(now).map(|last| now - last).filter(|&gap| gap >= GAP_MIN);
         self.gap = gap.or(self.gap);
+        gap.is_some_and(|gap| gap >= GAP_LONG)
     }
 }
 
@@ -89,7 +109,11 @@ impl Ready {
         match self.hold.as_ref()?.phase {
             Phase::AtRest => Some(JobStatus::Held),
             Phase::Dropping { .. } => Some(JobStatus::Ending),
-            Phase::Slowing | Phase::Rejoining { .. } | Phase::Resuming(_) | Phase::Leaving { .. } => None,
+            Phase::Slowing
+            | Phase::Heating
+            | Phase::Rejoining { .. }
+            | Phase::Resuming(_)
+            | Phase::Leaving { .. } => None,
         }
     }
 
@@ -143,7 +167,8 @@ impl Ready {
             phase: Phase::Slowing,
             reason: HoldReason::HostAway,
             nozzle: None,
-            could_extrude: false,
+            could_extrude: rest.is_nozzle_on(),
+            targets: rest.targets.clone(),
             is_told: false,
             rest: Some(Box::new(rest)),
         });
@@ -155,6 +180,7 @@ impl Ready {
             reason,
             nozzle: self.nozzle(),
             could_extrude: self.extrusion_permit() == ExtrusionPermit::Allowed,
+            targets: self.thermal.wanted(),
             is_told: false,
             rest: None,
         });
@@ -175,34 +201,75 @@ impl Ready {
         self.thermal.heater(gcode::Heater::Tool(0)).and_then(crate::heater::Heater::temperature)
     }
 
-    /// Goes on with what is held, with the very next step; `false` where nothing is.
+    /// Goes on with what is held, with the very next step, once it is as warm as it was; `false` where nothing is held.
     pub(super) fn resume_held(&mut self, now: Seconds) -> Result<bool, PrinterError> {
-        let nozzle = self.nozzle();
-        let permit = self.extrusion_permit();
-        let Some(hold) = self.hold.as_mut().filter(|hold| matches!(hold.phase, Phase::AtRest)) else {
+        let Some(hold) = self.hold.take_if(|hold| matches!(hold.phase, Phase::AtRest)) else {
             return Ok(false);
         };
-        let cooled = hold.nozzle.zip(nozzle).is_some_and(|(then, now)| (then - now).0 > COOLED_MAX_C);
-        let is_cold = permit != ExtrusionPermit::Allowed || cooled;
-        if let (true, true, Some(celsius)) = (hold.could_extrude, is_cold, nozzle) {
-            let detail = format!("the nozzle has cooled to {:.0} °C while the print was held", celsius.0);
+        let nozzle = self.nozzle();
+        let has_cooled = hold.nozzle.zip(nozzle).is_some_and(|(then, now)| (then - now).0 > COOLED_MAX_C);
+        let heats = self.heat_again(&hold.targets, hold.could_extrude, has_cooled, now);
+        let phase = match heats {
+            Ok(true) => Phase::Heating,
+            Ok(false) => hold.warm(now),
+            Err(_) => Phase::AtRest,
+        };
+        self.hold = Some(Hold { phase, ..hold });
+        heats.map(|_| true)
+    }
+
+    /// Heats what has been switched off or lowered to stand-by to what it was before; whether that is to be waited for.
+    /// Refused where nothing would make a nozzle warm enough that has to be.
+    pub(super) fn heat_again(
+        &mut self,
+        before: &[(gcode::Heater, Celsius)],
+        could_extrude: bool,
+        has_cooled: bool,
+        now: Seconds,
+    ) -> Result<bool, PrinterError> {
+        let is_cold = could_extrude && (has_cooled || self.extrusion_permit() != ExtrusionPermit::Allowed);
+        let min = self.config.extruder.as_ref().map_or(Celsius::ZERO, |it| it.heater.min_extrude_temp);
+        let goal = self.thermal.goal(gcode::Heater::Tool(0), before);
+        if is_cold && (goal <= Celsius::ZERO || goal < min) {
+            let celsius = self.nozzle().unwrap_or_default().0;
+            let detail = format!("the nozzle has cooled to {celsius:.0} °C meanwhile");
             return Err(PrinterError::new(ErrorCode::ColdExtrusion, detail));
         }
-        hold.phase = match &hold.rest {
-            Some(_) => {
-                let asked = Seconds(f64::NEG_INFINITY);
-                Phase::Rejoining { since: now, asked, answered: [false; MOTORS] }
+        let heats = self.thermal.reheat(before, &mut self.board, now)?;
+        if heats {
+            self.events.push(Event::Message("heating again before it goes on".into()));
+        }
+        Ok(heats || is_cold)
+    }
+
+    /// The board has lowered its heaters because this host was held up. What is held waits for the user anyway; all else
+    /// must not go on with them as if nothing had been.
+    pub(super) fn heaters_fell(&mut self, now: Seconds) {
+        let text =
+            "the computer did not reach the printer in time: its board lowered the heaters to stand-by";
+        self.events.push(Event::Message(text.into()));
+        match &mut self.hold {
+            Some(Hold { phase: phase @ Phase::Heating, reason, .. }) => {
+                *phase = Phase::AtRest;
+                self.events.push(Event::Held(hold_error(*reason, self.calls.gap.take())));
             }
-            None => Phase::Resuming(None),
-        };
-        Ok(true)
+            Some(_) => {}
+            None if matches!(self.wait, Wait::Heat) => {
+                self.wait = Wait::Nothing;
+                if let Some(job) = &mut self.job {
+                    job.state = JobState::Paused;
+                }
+                self.events.push(Event::Paused);
+            }
+            None if self.job.is_some() => drop(self.pause(now)),
+            None => self.stop_typed(),
+        }
     }
 
     /// Ends what is held; `false` where nothing is.
     pub(super) fn cancel_held(&mut self, now: Seconds) -> bool {
-        let Some(hold) = self.hold.as_mut().filter(|hold| matches!(hold.phase, Phase::AtRest)) else {
-            return false;
-        };
+        let may_end = |hold: &&mut Hold| matches!(hold.phase, Phase::AtRest | Phase::Heating);
+        let Some(hold) = self.hold.as_mut().filter(may_end) else { return false };
         let asked = Seconds(f64::NEG_INFINITY);
         hold.phase = Phase::Dropping { since: now, asked, counts: [None; MOTORS] };
         hold.rest = None;
@@ -258,6 +325,12 @@ impl Ready {
                 }
             }
             Phase::AtRest => self.cool_down(now),
+            Phase::Heating => {
+                self.last_active = now;
+                if self.thermal.is_heated() {
+                    hold.phase = hold.warm(now);
+                }
+            }
             Phase::Resuming(told @ None) => {
                 if let Some(cover) = self.cover_to_resume(now) {
                     self.lease.tell(cover, &mut self.board, now);

@@ -75,6 +75,8 @@ pub(super) struct Ready {
     lease: Lease,
     /// Motion is held.
     hold: Option<Hold>,
+    /// The board has lowered its heaters, which has not been dealt with.
+    have_heaters_fallen: bool,
     calls: Calls,
 }
 
@@ -106,6 +108,7 @@ impl Ready {
             last_active: now,
             lease,
             hold: None,
+            have_heaters_fallen: false,
             calls: Calls::default(),
         }
     }
@@ -143,6 +146,8 @@ impl Ready {
     }
 
     pub(super) fn receive(&mut self, bytes: &[u8], now: Seconds) -> Result<(), Failure> {
+        // After a long pause nothing may be claimed of the motion clock, whose 32 bits say little then.
+        self.lease.is_in_doubt(&mut self.board, now);
         for (message, sent) in inbox::receive(&mut self.board.link, &self.board.dictionary, bytes, now) {
             self.on_message(message, sent, now)?;
         }
@@ -164,6 +169,9 @@ impl Ready {
             Message::Shutdown { reason } => return Err(Failure::Shutdown(self.shutdown_error(reason))),
             Message::Starting => return Err(Failure::Lost(ErrorCode::BoardRestarted.into())),
             Message::Config { .. } => {}
+            Message::Heater(report) => {
+                self.have_heaters_fallen |= self.thermal.on_board_heater(report, now);
+            }
             Message::Motion(report) => self.on_motion(&report, now),
             Message::Queue { oid, queue, .. } => self.on_queue(oid, &queue),
             Message::Position { .. } | Message::Endstop { .. } | Message::Trigger { .. } => {
@@ -211,8 +219,10 @@ impl Ready {
         if self.board.sync.is_silent(now) {
             return Err(Failure::Lost(ErrorCode::LinkLost.into()));
         }
+        if self.calls.note(now) {
+            self.thermal.listens_again(now);
+        }
         self.thermal.check_silence(now).map_err(Failure::Stop)?;
-        self.calls.note(now);
         connect::ask_clock(&mut self.board, now);
         self.board.note_losses(now);
         self.thermal.poll(&mut self.board, now);
@@ -246,6 +256,9 @@ impl Ready {
         }
         if let Some(run) = self.stream.take_finished(motion_now, &self.board) {
             self.lease.end(run, &mut self.board);
+        }
+        if core::mem::take(&mut self.have_heaters_fallen) {
+            self.heaters_fell(now);
         }
         self.advance_wait(now);
         self.advance_hold(now)?;

@@ -33,7 +33,7 @@ pub(super) struct Rest {
     /// Each motor's direction after that.
     forward: [bool; MOTORS],
     from: [RowPlace; MOTORS],
-    targets: Vec<(gcode::Heater, Celsius)>,
+    pub(super) targets: Vec<(gcode::Heater, Celsius)>,
     fan: f64,
     /// Changes of the fan's speed that are yet to come, on the motion clock.
     fans: Vec<(Ticks, f64)>,
@@ -101,10 +101,7 @@ impl Ready {
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
         job.source = taken.source;
         job.has_moved = true;
-        job.leaves_hot = rest
-            .targets
-            .iter()
-            .any(|&(heater, target)| heater == gcode::Heater::Tool(0) && target > Celsius::ZERO);
+        job.leaves_hot = rest.is_nozzle_on();
         job.told = now;
         ready.job = Some(job);
         ready.hold_for_host(rest);
@@ -124,6 +121,13 @@ impl Ready {
 }
 
 impl Rest {
+    /// Whether the print had the nozzle hot.
+    pub(super) fn is_nozzle_on(&self) -> bool {
+        self.targets
+            .iter()
+            .any(|&(heater, target)| heater == gcode::Heater::Tool(0) && target > Celsius::ZERO)
+    }
+
     /// An action whose time has passed.
     fn pass(&mut self, action: &TimedAction) {
         match *action {

@@ -1,0 +1,300 @@
+// Prints kept in the origin's private file system, so that they outlive the page: for each a journal that only grows,
+// and a copy of its file. Runs in the worker, where files can be written in place and at once.
+//
+// Knows nothing of what a journal says. Layout: prints/<id>/journal, prints/<id>/file, and prints/<id>/complete once
+// the copy is. Bounded: so many prints, so long a journal; the oldest prints go first. Sizes in bytes.
+
+/** Prints that are kept, the one that is open included. */
+export const PRINTS_MAX = 8;
+/** A journal that grows beyond this is not one of ours. */
+export const JOURNAL_BYTES_MAX = 256 * 1024 * 1024;
+/** So much stays free when a file is copied: the journal needs room, too. */
+const SPARE_BYTES = 32 * 1024 * 1024;
+const FOLDER = 'prints';
+const JOURNAL = 'journal';
+const FILE = 'file';
+const COMPLETE = 'complete';
+const ID = /^[A-Za-z0-9-]{1,64}$/;
+
+export type StorageCode =
+  /** The browser keeps nothing for this page: a private window, or a setting. */
+  | 'unavailable'
+  /** The disk, or what the browser gives this page of it, is full. */
+  | 'full'
+  /** Another tab has this print open. */
+  | 'in-use'
+  | 'missing'
+  /** The copy of the file broke off. */
+  | 'incomplete'
+  | 'too-long'
+  | 'broken';
+
+export class StorageError extends Error {
+  readonly code: StorageCode;
+
+  constructor(code: StorageCode, cause?: unknown) {
+    super(code, { cause });
+    this.name = 'StorageError';
+    this.code = code;
+  }
+}
+
+const CODES: ReadonlyMap<string, StorageCode> = new Map([
+  ['QuotaExceededError', 'full'],
+  ['NoModificationAllowedError', 'in-use'],
+  ['InvalidStateError', 'broken'],
+  ['NotFoundError', 'missing'],
+  ['SecurityError', 'unavailable'],
+  ['NotAllowedError', 'unavailable'],
+]);
+
+function asStorageError(error: unknown): StorageError {
+  if (error instanceof StorageError) return error;
+  const name = error instanceof Error || error instanceof DOMException ? error.name : '';
+  return new StorageError(CODES.get(name) ?? 'broken', error);
+}
+
+/** Does what may fail in the browser's ways; it then fails in ours. */
+async function tried<T>(act: () => Promise<T>): Promise<T> {
+  try {
+    return await act();
+  } catch (error) {
+    throw asStorageError(error);
+  }
+}
+
+/** A file that is written in place: only workers have these, and TypeScript's types for pages lack them. */
+export interface SyncFile {
+  getSize(): number;
+  write(bytes: Uint8Array, options: { readonly at: number }): number;
+  truncate(size: number): void;
+  flush(): void;
+  close(): void;
+}
+
+type Writable = FileSystemFileHandle & { createSyncAccessHandle(): Promise<SyncFile> };
+
+export interface StoredPrint {
+  readonly id: string;
+  readonly journalBytes: number;
+  /** Null where there is no whole copy of the file. */
+  readonly fileBytes: number | null;
+  /** When the journal was last written. */
+  readonly changed: Date;
+}
+
+/** Writes all of `bytes`; a file system that takes less is full. */
+function writeAll(file: SyncFile, bytes: Uint8Array, at: number): void {
+  for (let done = 0; done < bytes.byteLength; ) {
+    const written = file.write(bytes.subarray(done), { at: at + done });
+    if (written <= 0) throw new StorageError('full');
+    done += written;
+  }
+}
+
+/** A print that is being written. Nobody else can open it meanwhile. */
+export class OpenPrint {
+  readonly #folder: FileSystemDirectoryHandle;
+  readonly #journal: SyncFile;
+  #end: number;
+  #isClosed = false;
+
+  constructor(folder: FileSystemDirectoryHandle, journal: SyncFile) {
+    this.#folder = folder;
+    this.#journal = journal;
+    this.#end = journal.getSize();
+  }
+
+  /** Behind what is there; on the disk when it returns. What could not be written whole is not there at all. */
+  appendJournal(bytes: Uint8Array): void {
+    if (this.#isClosed) throw new StorageError('broken');
+    if (this.#end + bytes.byteLength > JOURNAL_BYTES_MAX) throw new StorageError('too-long');
+    try {
+      writeAll(this.#journal, bytes, this.#end);
+      this.#journal.flush();
+      this.#end += bytes.byteLength;
+    } catch (error) {
+      this.#cut();
+      throw asStorageError(error);
+    }
+  }
+
+  #cut(): void {
+    try {
+      this.#journal.truncate(this.#end);
+    } catch {
+      // The reader of a journal looks for a torn end anyhow.
+    }
+  }
+
+  /** Keeps a copy of the print's file, in pieces; `progress` is told the bytes so far. */
+  async copyFile(
+    stream: ReadableStream<Uint8Array>,
+    progress: (bytes: number) => void = () => undefined,
+  ): Promise<void> {
+    await tried(async () => {
+      // What was said of an older copy does not hold any more.
+      await this.#folder.removeEntry(COMPLETE).catch(ignoreMissing);
+      const bytes = await fill(await openSync(this.#folder, FILE), stream, progress);
+      const mark = await openSync(this.#folder, COMPLETE);
+      try {
+        const text = new TextEncoder().encode(String(bytes));
+        mark.truncate(0);
+        writeAll(mark, text, 0);
+        mark.flush();
+      } finally {
+        mark.close();
+      }
+    });
+  }
+
+  close(): void {
+    if (this.#isClosed) return;
+    this.#isClosed = true;
+    this.#journal.close();
+  }
+}
+
+async function fill(
+  file: SyncFile,
+  stream: ReadableStream<Uint8Array>,
+  progress: (bytes: number) => void,
+): Promise<number> {
+  const reader = stream.getReader();
+  let bytes = 0;
+  try {
+    file.truncate(0);
+    for (;;) {
+      const { value, done } = await reader.read();
+      if (done) break;
+      writeAll(file, value, bytes);
+      bytes += value.byteLength;
+      progress(bytes);
+    }
+    file.flush();
+    return bytes;
+  } catch (error) {
+    await reader.cancel(error).catch(() => undefined);
+    throw error;
+  } finally {
+    file.close();
+  }
+}
+
+async function openSync(folder: FileSystemDirectoryHandle, name: string): Promise<SyncFile> {
+  const handle = (await folder.getFileHandle(name, { create: true })) as Writable;
+  return await handle.createSyncAccessHandle();
+}
+
+function ignoreMissing(error: unknown): void {
+  if (asStorageError(error).code !== 'missing') throw error;
+}
+
+export class PrintStore {
+  readonly #root: () => Promise<FileSystemDirectoryHandle>;
+  readonly #free: () => Promise<number>;
+
+  /** `free` says how many bytes may still be stored, as far as the browser tells. */
+  constructor(
+    root: () => Promise<FileSystemDirectoryHandle> = () => navigator.storage.getDirectory(),
+    free: () => Promise<number> = freeBytes,
+  ) {
+    this.#root = root;
+    this.#free = free;
+  }
+
+  #prints(): Promise<FileSystemDirectoryHandle> {
+    return this.#root().then((root) => root.getDirectoryHandle(FOLDER, { create: true }));
+  }
+
+  async #folder(id: string, create = false): Promise<FileSystemDirectoryHandle> {
+    if (!ID.test(id)) throw new StorageError('missing');
+    return await (await this.#prints()).getDirectoryHandle(id, { create });
+  }
+
+  /** Opens a print for writing, new or again; the oldest of the others go where there are too many. */
+  async openPrint(id: string): Promise<OpenPrint> {
+    return await tried(async () => {
+      const folder = await this.#folder(id, true);
+      const print = new OpenPrint(folder, await openSync(folder, JOURNAL));
+      await this.#tidy(id);
+      return print;
+    });
+  }
+
+  /** Whether a file of that size can be copied: better said before than half-way. */
+  async hasRoomFor(bytes: number): Promise<boolean> {
+    return (await this.#free()) >= bytes + SPARE_BYTES;
+  }
+
+  async #tidy(open: string): Promise<void> {
+    const others = (await this.listPrints()).filter(({ id }) => id !== open);
+    for (const { id } of others.slice(PRINTS_MAX - 1)) {
+      // One that another tab writes stays.
+      await this.remove(id).catch(() => undefined);
+    }
+  }
+
+  /** The newest first. */
+  async listPrints(): Promise<readonly StoredPrint[]> {
+    return await tried(async () => {
+      const found: StoredPrint[] = [];
+      for await (const [id, entry] of (await this.#prints()).entries()) {
+        if (entry.kind === 'directory') found.push(await describe(id, entry as FileSystemDirectoryHandle));
+      }
+      return found.sort((a, b) => b.changed.getTime() - a.changed.getTime());
+    });
+  }
+
+  async readJournal(id: string): Promise<Uint8Array<ArrayBuffer>> {
+    return await tried(async () => {
+      const journal = await (await (await this.#folder(id)).getFileHandle(JOURNAL)).getFile();
+      if (journal.size > JOURNAL_BYTES_MAX) throw new StorageError('too-long');
+      return new Uint8Array(await journal.arrayBuffer());
+    });
+  }
+
+  /** The whole copy of the print's file; `incomplete` where there is none. */
+  async openFile(id: string): Promise<File> {
+    return await tried(async () => {
+      const folder = await this.#folder(id);
+      const size = await copiedBytes(folder);
+      if (size === null) throw new StorageError('incomplete');
+      return await (await folder.getFileHandle(FILE)).getFile();
+    });
+  }
+
+  /** Nothing of it is left; it is no error where nothing was. */
+  async remove(id: string): Promise<void> {
+    if (!ID.test(id)) return;
+    await tried(async () => (await this.#prints()).removeEntry(id, { recursive: true }).catch(ignoreMissing));
+  }
+}
+
+/** The size of the copy where it is whole, else null. */
+async function copiedBytes(folder: FileSystemDirectoryHandle): Promise<number | null> {
+  try {
+    const mark = await (await (await folder.getFileHandle(COMPLETE)).getFile()).text();
+    const { size } = await (await folder.getFileHandle(FILE)).getFile();
+    return mark === String(size) ? size : null;
+  } catch (error) {
+    ignoreMissing(error);
+    return null;
+  }
+}
+
+async function describe(id: string, folder: FileSystemDirectoryHandle): Promise<StoredPrint> {
+  let [journalBytes, changed] = [0, new Date(0)];
+  try {
+    const journal = await (await folder.getFileHandle(JOURNAL)).getFile();
+    [journalBytes, changed] = [journal.size, new Date(journal.lastModified)];
+  } catch (error) {
+    ignoreMissing(error);
+  }
+  return { id, journalBytes, fileBytes: await copiedBytes(folder), changed };
+}
+
+async function freeBytes(): Promise<number> {
+  const { quota, usage } = await navigator.storage.estimate();
+  return quota === undefined || usage === undefined ? Number.POSITIVE_INFINITY : quota - usage;
+}
