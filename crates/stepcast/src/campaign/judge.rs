@@ -12,9 +12,9 @@ const ALIVE: Seconds = Seconds(2.0);
 /// The longest ramp where none was told.
 const RAMP: Seconds = Seconds(0.3);
 /// Heaters may go without orders for so long: then they are at stand-by, or off where the board has none.
-const HEATERS_ALONE: Seconds = Seconds(3.0);
+const HEATERS_ALONE: Seconds = Seconds(5.0);
 /// All of that is looked at and reported with this delay.
-const HEATERS_SPARE: Seconds = Seconds(1.0);
+const HEATERS_SPARE: Seconds = Seconds(2.0);
 /// Steps so long after a board has failed belong to motion that has begun anew.
 const STILL_AFTER: Seconds = Seconds(0.1);
 

@@ -307,6 +307,7 @@ fn a_board_that_starts_anew_lets_its_pins_go_and_says_so() {
     host.run(2.0);
     let state = host.state();
     assert_eq!((state.shutdown, state.heaters[0].duty), (None, 0.0));
-    let says = |answer: &Answer| Response::decode(&mut &answer.payload[..]);
-    assert!(host.answers.iter().any(|answer| says(answer) == Ok(Response::Starting {})));
+    let is_starting =
+        |answer: &Answer| matches!(Response::decode(&mut &answer.payload[..]), Ok(Response::Starting {}));
+    assert!(host.answers.iter().any(is_starting));
 }
