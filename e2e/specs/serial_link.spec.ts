@@ -1,4 +1,6 @@
 // A port that is not given, not there, not free, or goes away: what the page says, and what the printer does meanwhile.
+
+import { expectLooksAfterItself } from '../fixtures/on_its_own.ts';
 import { expect, measured, type SerialPanel, test } from '../fixtures/serial.ts';
 import { clickedAt, stampClick, stopped } from '../fixtures/stops.ts';
 import type { DeviceBridge } from '../serial/bridge.ts';
@@ -106,12 +108,10 @@ async function unplugWhilePrinting(
   await expect(panel.alert).toContainText(/heaters off within 5 seconds/);
   await expect(panel.status).toContainText('Not connected');
   await expect(panel.job).toContainText('The print stopped before its end.');
-  // The board looks after itself.
-  await expect.poll(() => duties(printer)).toEqual([0, 0]);
-  await expect.poll(() => printer.state().shutdown).not.toBeNull();
+  await expectLooksAfterItself(printer);
 }
 
-test('unplugged while printing: the board stops by itself, and nothing starts again by itself', async ({
+test('unplugged while printing: the board comes to rest by itself, and nothing starts again by itself', async ({
   bridge,
   open,
 }) => {
@@ -123,10 +123,7 @@ test('unplugged while printing: the board stops by itself, and nothing starts ag
   bridge.replug(port);
   await expectOffered(panel, port, 1);
   await panel.connectOffered();
-  // The board remembers that it stopped; only the user starts it anew.
-  await expect(panel.status).toContainText('Stopped');
-  await expect(panel.alert).toContainText('The board had no orders for a heater in time');
-  await panel.alert.getByRole('button', { name: 'Restart the board' }).click();
+  // The board begins anew: nothing of the print is left, and it does not know where the head is.
   await expect(panel.status).toContainText('Ready');
   await expect(panel.print).toBeEnabled();
   await expect(panel.motion).toContainText('Home first');

@@ -75,7 +75,7 @@ for (const isTerminal of [false, true]) {
     await expect(panel.alert).toContainText('The device is there again.');
     expect(port.counts.openings).toBe(1);
     await reconnect.click();
-    await expect(panel.status).toContainText(/Stopped|Ready/);
+    await expect(panel.status).toContainText(/Holding a print|Ready/);
     expect(port.counts.openings).toBe(2);
   });
 }

@@ -1,6 +1,7 @@
 // Two tabs of one browser: the second one shows what the first one drives, and can stop it, whatever the first one's
 // page does. When the first tab goes, the second says so and takes over only when it is told to.
 
+import { expectLooksAfterItself } from '../fixtures/on_its_own.ts';
 import { expect, measured, type SerialPanel, test } from '../fixtures/serial.ts';
 import { block, clickedAt, stampClick, stopped } from '../fixtures/stops.ts';
 import type { Watch } from '../fixtures/watch.ts';
@@ -115,12 +116,12 @@ test('when the first tab is closed the second one says so at once, and takes ove
   expect(tookMs).toBeLessThan(GONE_MS_MAX);
   await expect(second.alert).toContainText('A print does not start again by itself.');
   await expect(second.status).toContainText('Not connected');
-  await expect.poll(() => printer.state().heaters.map(({ duty }) => duty)).toEqual([0, 0]);
+  await expectLooksAfterItself(printer);
   expect(port.counts.openings, 'nothing is opened without a word').toBe(1);
   await second.alert.getByRole('button', { name: 'Connect here' }).click();
   await second.chooseSerialIn(second.dialog('Connect'));
   await second.connectIn(second.dialog('Connect'));
-  await expect(second.status).toContainText(/Stopped|Ready/);
+  await expect(second.status).toContainText(/Holding a print|Ready/);
   expect(port.counts.openings).toBe(2);
 });
 

@@ -2,6 +2,7 @@
 // printer, and goes on with a new worker.
 import type { Worker } from '@playwright/test';
 import { travels } from '../fixtures/gcode.ts';
+import { expectLooksAfterItself } from '../fixtures/on_its_own.ts';
 import { expect, type SerialPanel, test } from '../fixtures/serial.ts';
 import { machineWorker } from '../fixtures/worker.ts';
 import { strolling } from '../serial/gcode.ts';
@@ -39,10 +40,10 @@ test('with a printer on USB: the port is free again, and connecting works', asyn
   await expectTold(panel);
   await expect(panel.alert).toContainText('The printer is on its own');
   await expect.poll(() => port.holder).toBeUndefined();
-  await expect.poll(() => printer.state().heaters.map(({ duty }) => duty)).toEqual([0, 0]);
-  // The board has stopped for want of orders, and the new worker gets through to it.
+  await expectLooksAfterItself(printer);
+  // The board holds what it had, and the new worker gets through to it.
   await panel.connectOffered();
-  await expect(panel.status).toContainText(/Stopped|Ready/);
+  await expect(panel.status).toContainText(/Holding a print|Ready/);
   expect(port.counts.openings).toBe(2);
 });
 

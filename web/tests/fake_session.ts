@@ -7,7 +7,9 @@ import { celsius, type Seconds, seconds, share } from '../src/units';
 
 const SNAPSHOT: SessionSnapshot = {
   phase: 'ready',
-  heaters: [{ name: 'extruder', temperature: celsius(20), target: celsius(0), duty: share(0) }],
+  heaters: [
+    { name: 'extruder', temperature: celsius(20), target: celsius(0), duty: share(0), isStandby: false },
+  ],
   position: null,
   homed: [false, false, false],
   job: 'none',

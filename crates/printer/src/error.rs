@@ -66,11 +66,13 @@ const AXIS_STOPPED: &str =
 const JOB_ENDED: &str = "The print has ended: the moves before that place were made, the motors stand still, the heaters \
                          and the fan are off.";
 /// The board holds its motion.
-const HELD: &str = "The head rests on its path, no step was lost and the position is known. Heaters stay as they \
-                    were set, and the board goes on watching them. Nothing goes on by itself.";
+const HELD: &str = "The head rests on its path, no step was lost and the position is known. The board goes \
+                    on watching the heaters; those that it has lowered to stand-by are heated again when you resume. \
+                    Nothing goes on by itself.";
 /// Contact is gone, so nothing can be claimed but what the board does by itself.
-const ON_ITS_OWN: &str = "The printer is on its own: its board switches the heaters off within 5 seconds without \
-                          orders and stops when its queue of moves is empty. It may have lost its position.";
+const ON_ITS_OWN: &str = "The printer is on its own: after a few seconds without orders its board switches the \
+                          heaters off, or keeps them at stand-by for a while and then switches them off. Its motion \
+                          comes to rest; it may have lost its position.";
 
 catalogue! {
     SensorBelowMin, "sensor-below-min":

@@ -23,8 +23,7 @@ fn scratch(name: &str, content: &str) -> PathBuf {
 
 fn simulate(name: &str, more: &[&str]) -> Value {
     let file = scratch(&format!("{name}.gcode"), PRINT);
-    let option = "[printer]\nheater_max_duration: 5";
-    let machine = scratch(&format!("{name}.cfg"), &MACHINE.replacen("[printer]", option, 1));
+    let machine = scratch(&format!("{name}.cfg"), MACHINE);
     let output = Command::new(env!("CARGO_BIN_EXE_stepcast"))
         .arg("simulate")
         .args([&file, Path::new("--config"), &machine, Path::new("--json")])
@@ -58,6 +57,21 @@ fn a_print_whose_host_is_held_up_is_the_same_print() {
         assert!(held["path_error_max_mm"].as_f64().expect("a distance") <= 0.02);
         let lost = held["motors"].as_object().expect("motors").values().map(|motor| &motor["lost_steps"]);
         assert!(lost.into_iter().all(|lost| lost == 0));
+    }
+}
+
+#[test]
+fn a_host_that_is_away_for_long_resumes_hot() {
+    let clean = simulate("holds-clean-long", &[]);
+    let at = on_the_way(&clean);
+    for lasts in [30.0, 2400.0] {
+        let fault = format!("--fault=host-stall={lasts}@{at}");
+        let held = simulate(&format!("holds-long-{lasts}"), &[&fault, "--confirm-holds"]);
+        assert_eq!(held["result"], "done", "{held:#}");
+        assert_eq!((&held["holds"], &held["step_digest"]), (&Value::from(1), &clean["step_digest"]));
+        assert!(held["motors"].as_object().expect("motors").values().all(|motor| motor["lost_steps"] == 0));
+        // Whatever was extruded was extruded as hot as it has to be.
+        assert!(held["temperature_error_max_c"].as_f64().is_none_or(|error| error <= 3.0), "{held:#}");
     }
 }
 

@@ -15,4 +15,8 @@ confirm_all: boolean,
 /**
  * The print's own number, with which a journal is kept: any that no other print has.
  */
-journal: number | null, };
+journal: number | null, 
+/**
+ * The line with which the job begins, paused; `null`: with its file.
+ */
+start_line: number | null, };

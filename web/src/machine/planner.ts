@@ -129,6 +129,7 @@ function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
       temperature: celsius(heater.temperature_c),
       target: celsius(heater.target_c),
       duty: share(heater.duty),
+      isStandby: heater.standby,
     })),
     position: position && place(position),
     homed: now.homed,
@@ -187,6 +188,7 @@ class WasmSession implements Session {
       confirmed_lines: isAll ? [] : [...confirmedLines],
       confirm_all: isAll,
       journal: null,
+      start_line: null,
     };
     return refusal(() => this.#inner.start_job(JSON.stringify(request), now));
   }

@@ -24,6 +24,8 @@ export interface HeaterState {
   /** 0 is off. */
   readonly target: Celsius;
   readonly duty: Share;
+  /** The board has lowered it, or switched it off, because it was out of touch with the page. */
+  readonly isStandby: boolean;
 }
 
 /** The connection to the board, from the first byte on. */

@@ -7,7 +7,7 @@ import type { StorageCode } from './storage';
 
 const NOTHING_MOVED = 'Nothing was sent to the printer: it did not move and no heater was switched on.';
 const ON_ITS_OWN =
-  'The printer is on its own: its board switches the heaters off within 5 seconds without orders and stops when its queue of moves is empty. It may have lost its position.';
+  'The printer is on its own. A board with Stepcast\u2019s firmware brings the head to rest on its path and lowers the nozzle to stand-by; any other board switches the heaters off within 5 seconds and stops when its queue of moves is empty, its position lost.';
 
 const trouble = (code: string, happened: string, safe: string, todo: string): Trouble => ({
   code,
@@ -21,7 +21,7 @@ const PORT: Record<PortFailureCode | 'port-unusable', readonly [string, string, 
   unplugged: [
     'The printer was unplugged, or its board switched off.',
     ON_ITS_OWN,
-    'Look at the printer first. Plug it in again and connect; a print does not start again by itself. Home before printing.',
+    'Look at the printer first. Plug it in again and connect; a print does not start again by itself.',
   ],
   'port-busy': [
     'The port could not be opened.',
@@ -144,7 +144,7 @@ export const stopNotSent = (reason: keyof typeof STOP_REASONS): Trouble =>
     `No emergency stop could be sent: ${STOP_REASONS[reason]}.`,
     reason === 'identifying'
       ? 'The stop is sent as soon as the board has said it. Until then nothing is known of what the printer does.'
-      : 'Nothing is known of what the printer does. A board without orders switches its heaters off within 5 seconds and stops when its queue of moves is empty.',
+      : 'Nothing is known of what the printer does. A board without orders lowers its heaters or switches them off within 5 seconds, and stops when its queue of moves is empty or before.',
     'If the printer moves or heats, cut its power now.',
   );
 

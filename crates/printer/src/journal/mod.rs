@@ -99,6 +99,8 @@ pub enum Record {
         confirmed: BTreeSet<u32>,
         /// … or all of them.
         confirm_all: bool,
+        /// The line with which the print begins, where that is not the first.
+        start_line: Option<u32>,
     },
     /// Something changed the plan.
     Input {
@@ -194,6 +196,8 @@ pub struct Journal {
     pub confirmed: BTreeSet<u32>,
     /// Whether all of them were.
     pub confirm_all: bool,
+    /// The line with which the print begins, where that is not the first.
+    pub start_line: Option<u32>,
     inputs: Vec<(Place, Input)>,
     runs: Vec<CountedRun>,
     /// The line of the last move that was seen to be made, and the print time then.
@@ -234,7 +238,17 @@ impl Journal {
     }
 
     fn begin(record: Record) -> Result<Self, JournalError> {
-        let Record::Began { format, print, machine, clock, position, homed, confirmed, confirm_all } = record
+        let Record::Began {
+            format,
+            print,
+            machine,
+            clock,
+            position,
+            homed,
+            confirmed,
+            confirm_all,
+            start_line,
+        } = record
         else {
             return Err(JournalError::NoBegin);
         };
@@ -249,6 +263,7 @@ impl Journal {
             homed,
             confirmed,
             confirm_all,
+            start_line,
             inputs: Vec::new(),
             runs: Vec::new(),
             progress: None,
@@ -299,6 +314,7 @@ mod tests {
             homed: [true, false, true],
             confirmed: [3, 9].into(),
             confirm_all: false,
+            start_line: None,
         }
     }
 

@@ -22,7 +22,7 @@ use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
     machine::{self, MOTORS},
-    planner::{Barrier, ExtrusionPermit, Planned, Planner, Position, Source, TimedAction},
+    planner::{Barrier, ExtrusionPermit, Planned, Planner, Position, Skip, Skipped, Source, TimedAction},
 };
 
 /// Items of the plan that are made in one go.
@@ -119,6 +119,8 @@ pub(crate) struct Replay {
     elapsed: Seconds,
     /// The last number in the journal.
     last_id: u32,
+    /// Reads up to the line with which the print begins.
+    skip: Option<Skip>,
     is_done: bool,
 }
 
@@ -149,6 +151,7 @@ impl Replay {
         planner.guard.extrusion = ExtrusionPermit::Allowed;
         let mut source = Source::new(machine::gcode_settings(config));
         planner.begin_job(&mut source);
+        let endstops = config.steppers.each_ref().map(|stepper| stepper.position_endstop.0);
         let pins = config.steppers.each_ref().map(|stepper| stepper.motor.dir_pin.inverted);
         let extruder = config.extruder.as_ref().is_some_and(|extruder| extruder.motor.dir_pin.inverted);
         Ok(Self {
@@ -160,7 +163,7 @@ impl Replay {
             wanted,
             queue,
             inverted: [pins[0], pins[1], pins[2], extruder],
-            endstops: config.steppers.each_ref().map(|stepper| stepper.position_endstop.0),
+            endstops,
             runs: 0,
             position_at_start: journal.position,
             motors: core::array::from_fn(|_| Motor::default()),
@@ -171,6 +174,7 @@ impl Replay {
             fan: 0.0,
             elapsed: Seconds::ZERO,
             last_id: journal.runs.last().map_or(0, |run| run.id),
+            skip: journal.start_line.map(|line| Skip::new(line, endstops)),
             is_done: false,
         })
     }
@@ -194,6 +198,17 @@ impl Replay {
 
     /// Makes a piece of the plan.
     pub(crate) fn advance(&mut self) -> Result<Advance, PrinterError> {
+        if let Some(skip) = &mut self.skip {
+            match skip.advance(&mut self.planner, &mut self.source)? {
+                Skipped::NeedsInput => return Ok(Advance::NeedsInput),
+                Skipped::Working => return Ok(Advance::Working),
+                Skipped::Done => {
+                    self.targets.clone_from(&skip.targets);
+                    self.fan = skip.fan;
+                    self.skip = None;
+                }
+            }
+        }
         for _ in 0..ITEMS_MAX {
             if self.is_done {
                 return Ok(Advance::Done);

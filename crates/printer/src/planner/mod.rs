@@ -8,6 +8,7 @@
 mod guard;
 mod item;
 mod report;
+mod skip;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -22,6 +23,7 @@ use units::{Hertz, MmPerS, Seconds, Ticks};
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
 pub use report::{MotorReport, PLAN_CLOCK, PlanReport, PlanStream};
+pub(crate) use skip::{Skip, Skipped};
 pub use source::{SOURCE_BYTES_MAX, Source};
 
 use crate::{

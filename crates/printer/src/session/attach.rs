@@ -28,7 +28,7 @@ const ASK_AGAIN: Seconds = Seconds(0.3);
 /// A host that is gone leaves motion of a few seconds; a board that moves for longer does what nobody here knows.
 const REST_MAX: Seconds = Seconds(15.0);
 /// While the plan is made again the session wants to be called soon.
-const REPLAY_WAKE: Seconds = Seconds(0.001);
+const REPLAY_WAKE: Seconds = Seconds(0.002);
 
 /// What a board that has been set up already does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,6 +155,7 @@ impl Holding {
             confirmed_lines: journal.confirmed.clone(),
             confirm_all: journal.confirm_all,
             journal: Some(journal.print),
+            start_line: journal.start_line,
         };
         self.replay = Some((replay, options));
         Ok(())
@@ -204,8 +205,7 @@ impl Holding {
         let Some((mut replay, options)) = self.replay.take() else { return Ok(Err(wake)) };
         match replay.advance() {
             Ok(Advance::Done) => return Ok(Ok((replay.finish(), options))),
-            Ok(Advance::NeedsInput) => self.replay = Some((replay, options)),
-            Ok(Advance::Working) => {
+            Ok(Advance::NeedsInput | Advance::Working) => {
                 self.replay = Some((replay, options));
                 return Ok(Err(now + REPLAY_WAKE));
             }

@@ -61,6 +61,7 @@ impl Diary {
             homed: planner.guard.homed(),
             confirmed: options.confirmed_lines.clone(),
             confirm_all: options.confirm_all,
+            start_line: options.start_line.filter(|&line| line > 1),
         });
         self.job = Some(Job { place: Place::default(), runs: 0, id: print, told: now });
     }

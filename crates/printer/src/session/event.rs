@@ -247,6 +247,13 @@ pub enum Request {
         /// How fast.
         speed: MmPerS,
     },
+    /// An axis, 0, 1, 2 for X, Y, Z, stands there: the user says so, and it counts as homed.
+    SetPosition {
+        /// Which.
+        axis: usize,
+        /// Where.
+        position: Mm,
+    },
     /// A heater's target; 0 is off.
     SetTemperature(Heater, Celsius),
     /// The part fan's speed, 0 ..= 1.

@@ -7,7 +7,7 @@ use units::{MmPerS, Seconds};
 
 use crate::{
     error::PrinterError,
-    planner::{Planner, Position, Source},
+    planner::{Planner, Position, Skip, Source},
 };
 
 /// Going back to where a print was paused is done at this speed.
@@ -25,6 +25,9 @@ pub struct JobOptions {
     /// The print's own number, with which a journal is kept ([`crate::journal`]). Any that no other print has; the next
     /// million belong to it too.
     pub journal: Option<u32>,
+    /// The job begins with this line, as if those before it had been made: it is paused, until the machine is homed and
+    /// the user resumes it.
+    pub start_line: Option<u32>,
 }
 
 /// What a job is doing.
@@ -33,6 +36,8 @@ pub(super) enum JobState {
     Printing,
     /// Coming to rest; then it waits.
     Pausing,
+    /// Reading up to the line with which it begins; then it is paused.
+    Skipping,
     Paused,
     /// Going back to where it was paused.
     Returning,
@@ -71,6 +76,16 @@ pub(super) struct Paused {
     pub(super) could_extrude: bool,
     /// What the heaters were set to.
     pub(super) targets: Vec<(gcode::Heater, units::Celsius)>,
+    /// Where it begins in the middle of its file.
+    pub(super) start: Option<Start>,
+}
+
+/// How a job begins that does not begin with its file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    /// Ways lead over what has been printed at this height, in mm.
+    pub(super) clear_z: f64,
+    pub(super) fan: f64,
 }
 
 /// A print.
@@ -80,6 +95,8 @@ pub(super) struct Job {
     pub(super) options: JobOptions,
     pub(super) state: JobState,
     pub(super) paused: Option<Paused>,
+    /// Reads up to the line with which it begins.
+    pub(super) skip: Option<Skip>,
     pub(super) told: Seconds,
     /// It has made a move.
     pub(super) has_moved: bool,
@@ -94,6 +111,7 @@ impl Job {
             options,
             state: JobState::Printing,
             paused: None,
+            skip: None,
             told: Seconds(f64::NEG_INFINITY),
             has_moved: false,
             leaves_hot: false,
@@ -102,7 +120,7 @@ impl Job {
 
     pub(super) const fn status(&self) -> JobStatus {
         match self.state {
-            JobState::Printing | JobState::Returning => JobStatus::Printing,
+            JobState::Printing | JobState::Skipping | JobState::Returning => JobStatus::Printing,
             JobState::Pausing => JobStatus::Pausing,
             JobState::Paused => JobStatus::Paused,
             JobState::Cancelling | JobState::Failing(_) => JobStatus::Ending,

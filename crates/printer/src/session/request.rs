@@ -1,6 +1,6 @@
 //! What an owner may ask of a session, and when it is refused.
 
-use units::Seconds;
+use units::{Mm, Seconds};
 use wire::Command;
 
 use super::{
@@ -49,6 +49,7 @@ impl Session {
                 ready.sources().for_each(|source| source.interpreter.set_flow_factor(factor));
                 ready.diary.input(Input::Flow(factor));
             }
+            Request::SetPosition { axis, position } => ready.set_position(axis, position)?,
             Request::Pause => ready.pause(now)?,
             Request::Resume => ready.resume(now)?,
             Request::Cancel => ready.cancel(now)?,
@@ -99,7 +100,10 @@ impl Session {
             return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
         }
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
-        ready.planner.begin_job(&mut job.source);
+        match job.options.start_line {
+            Some(line) if line > 1 => ready.begin_at(&mut job, line)?,
+            _ => ready.planner.begin_job(&mut job.source),
+        }
         ready.diary.begin(&job.options, &ready.config, &ready.planner, now);
         ready.last_active = now;
         ready.stream.reset_elapsed();
@@ -213,6 +217,23 @@ impl Ready {
             JobStatus::None | JobStatus::Paused => Ok(&mut self.console),
             _ => Err(ErrorCode::BusyPrinting.into()),
         }
+    }
+
+    /// Takes the user's word for where an axis stands.
+    fn set_position(&mut self, axis: usize, position: Mm) -> Result<(), PrinterError> {
+        self.idle_console()?;
+        if self.is_console_busy() {
+            return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
+        }
+        let limits =
+            self.config.steppers.get(axis).map(|stepper| (stepper.position_min, stepper.position_max));
+        if !limits.is_some_and(|(min, max)| (min..=max).contains(&position)) {
+            let detail = format!("an axis cannot stand at {position}");
+            return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail));
+        }
+        self.planner.set_axis(axis, position.0, true);
+        self.planner.correct(&mut self.console.source);
+        Ok(())
     }
 
     fn sources(&mut self) -> impl Iterator<Item = &mut crate::planner::Source> {

@@ -238,12 +238,11 @@ impl Thermal {
         channel.last_report = Some(read_at);
         match channel.heater.sample(temperature, read_at) {
             Ok(duty) => {
-                let duty = match &channel.board {
-                    Some(heater) => heater.duty(),
-                    None => {
-                        channel.power(duty, board, now);
-                        duty
-                    }
+                let duty = if let Some(heater) = &channel.board {
+                    heater.duty()
+                } else {
+                    channel.power(duty, board, now);
+                    duty
                 };
                 Some(Ok(Event::Temperature {
                     heater: channel.name,

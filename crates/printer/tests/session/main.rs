@@ -10,4 +10,5 @@ mod hold;
 mod link;
 mod machine;
 mod print;
+mod start;
 mod stopping;

@@ -46,6 +46,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
         confirmed_lines: args.confirm_lines.iter().copied().collect::<BTreeSet<u32>>(),
         confirm_all: args.confirm_all,
         journal: None,
+        start_line: None,
     };
     let setup = Setup {
         config,
@@ -158,7 +159,12 @@ mod tests {
         let refusal = Refusal::of(&found, &JobOptions::default()).unwrap();
         assert_eq!(refusal.reason.line, Some(2));
         assert_eq!(refusal.blocking.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [2, 3]);
-        let one = JobOptions { confirmed_lines: BTreeSet::from([2]), confirm_all: false, journal: None };
+        let one = JobOptions {
+            confirmed_lines: BTreeSet::from([2]),
+            confirm_all: false,
+            journal: None,
+            start_line: None,
+        };
         assert_eq!(Refusal::of(&found, &one).unwrap().reason.line, Some(3));
         let all = JobOptions { confirm_all: true, ..JobOptions::default() };
         assert!(Refusal::of(&found, &all).is_none());

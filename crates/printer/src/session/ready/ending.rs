@@ -99,16 +99,17 @@ impl Ready {
         let Some(paused) = paused.and_then(|job| job.paused.as_ref()) else {
             return Err(PrinterError::new(ErrorCode::NoJob, "no job is paused"));
         };
-        let Paused { homed: was_homed, could_extrude, .. } = *paused;
+        let Paused { homed: was_homed, could_extrude, start, .. } = *paused;
         if self.is_console_busy() {
             return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
         }
         let homed = self.planner.guard.homed();
         if (0..3).any(|axis| was_homed[axis] && !homed[axis]) {
-            return Err(PrinterError::new(
-                ErrorCode::NotHomed,
-                "the position was lost while the job was paused",
-            ));
+            let detail = match start {
+                Some(_) => "the way to the first line leads from a known place only",
+                None => "the position was lost while the job was paused",
+            };
+            return Err(PrinterError::new(ErrorCode::NotHomed, detail));
         }
         let targets = paused.targets.clone();
         let heats = self.heat_again(&targets, could_extrude, false, now)?;
@@ -128,11 +129,12 @@ impl Ready {
     /// does an axis whose position was not known then.
     pub(super) fn go_back(&mut self) -> Result<(), PrinterError> {
         let Some(paused) = self.job.as_ref().and_then(|job| job.paused.as_ref()) else { return Ok(()) };
-        let Paused { position, homed: was_homed, .. } = *paused;
+        let Paused { position, homed: was_homed, start, .. } = *paused;
         let here = self.planner.position();
         let [x, y, z] =
             core::array::from_fn(|axis| if was_homed[axis] { position[axis] } else { here[axis] });
-        let (up, e) = (here[2].max(z), here[3]);
+        let clear_z = start.map_or(z, |start| start.clear_z);
+        let (up, e) = (here[2].max(z).max(clear_z), here[3]);
         for to in [[here[0], here[1], up, e], [x, y, up, e], [x, y, z, e]] {
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
         }
@@ -155,7 +157,7 @@ impl Ready {
             Some(JobState::Returning) => self.has_returned(now),
             Some(JobState::Cancelling) => self.end_job(Event::JobCancelled, now),
             Some(JobState::Failing(error)) => self.end_job(Event::Error(error), now),
-            Some(JobState::Printing) => {}
+            Some(JobState::Printing | JobState::Skipping) => {}
             Some(JobState::Paused) | None => self.idle(now),
         }
     }
@@ -174,7 +176,7 @@ impl Ready {
         let planner = Box::new(core::mem::replace(&mut self.planner, aside));
         if let Some(job) = &mut self.job {
             job.state = JobState::Paused;
-            job.paused = Some(Paused { planner, position, homed, could_extrude, targets });
+            job.paused = Some(Paused { planner, position, homed, could_extrude, targets, start: None });
         }
         self.last_active = now;
         self.console.clear();
@@ -185,10 +187,13 @@ impl Ready {
     /// The machine is where the job was paused: its own planner goes on.
     fn has_returned(&mut self, now: Seconds) {
         let Some(job) = &mut self.job else { return };
+        job.state = JobState::Printing;
         if let Some(paused) = job.paused.take() {
             self.planner = *paused.planner;
+            if let Some(start) = paused.start {
+                self.thermal.set_fan(start.fan, None, &mut self.board, now);
+            }
         }
-        job.state = JobState::Printing;
         let Held { wait, barrier } = core::mem::take(&mut self.held);
         self.wait = wait.go_on(now);
         self.planner.put_barrier(barrier);

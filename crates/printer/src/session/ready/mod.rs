@@ -6,6 +6,7 @@
 mod ending;
 mod hold;
 mod plan;
+mod start;
 mod take_up;
 mod waiting;
 
@@ -38,6 +39,8 @@ use crate::{
 
 /// While motion is being made, the planner is asked for more at least this often.
 const PUMP_INTERVAL: Seconds = Seconds(0.05);
+/// While lines are passed over, the owner is asked for more of the file this often.
+const SKIP_INTERVAL: Seconds = Seconds(0.002);
 /// How often a machine at rest looks after itself.
 const IDLE_INTERVAL: Seconds = Seconds(0.25);
 /// Motion that is due this long ago and has not been sent is none that the board could make.
@@ -232,7 +235,12 @@ impl Ready {
         self.check_late(now)?;
         let link_wake = self.board.link.poll(now, self.board.clocks(now), out);
         let busy = self.stream.run().is_some() || !matches!(self.wait, Wait::Nothing);
-        let own_wake = now + if busy { PUMP_INTERVAL } else { IDLE_INTERVAL };
+        let own_wake = now
+            + match busy {
+                _ if self.skips() => SKIP_INTERVAL,
+                true => PUMP_INTERVAL,
+                false => IDLE_INTERVAL,
+            };
         let wake = own_wake.min(self.board.sync.next_wake());
         Ok(link_wake.map_or(wake, |link| link.min(wake)))
     }

@@ -22,6 +22,10 @@ const PLAN_ITEMS_MAX: usize = 4096;
 impl Ready {
     /// Takes from the planner what is to be sent.
     pub(super) fn pump(&mut self, now: Seconds) -> Result<(), Failure> {
+        if self.skips() {
+            self.skip(now);
+            return Ok(());
+        }
         self.planner.guard.extrusion = self.extrusion_permit();
         for _ in 0..PLAN_ITEMS_MAX {
             let clock_now = self.board.motion_at(now);
