@@ -1,5 +1,6 @@
 //! Whether a faulty print kept its promise, and what it measured.
 
+use printer::error::ErrorCode;
 use units::{Hertz, Seconds, Ticks};
 
 use super::scenario::{Case, Promise};
@@ -54,6 +55,8 @@ pub(super) fn judge(case: &Case, clean: &Print, print: &Print, standby: Seconds)
     match case.promise {
         Promise::SamePulses => judging.same(true, &mut finding),
         Promise::SameSteps => judging.same(false, &mut finding),
+        Promise::SameStepsOrRefused if is_refused(print) => {}
+        Promise::SameStepsOrRefused => judging.same(false, &mut finding),
         Promise::AtRest => judging.at_rest(standby, &mut finding),
         Promise::Fails => judging.fails(standby, &mut finding),
         Promise::Shutdown => judging.shuts_down(standby, &mut finding),
@@ -64,6 +67,11 @@ pub(super) fn judge(case: &Case, clean: &Print, print: &Print, standby: Seconds)
         finding.broken.push("motion began again without the user's word".to_owned());
     }
     finding
+}
+
+/// Whether the print was not gone on with, and why was said.
+fn is_refused(print: &Print) -> bool {
+    print.report.error.as_ref().is_some_and(|error| error.code == ErrorCode::ContinuationRefused.as_str())
 }
 
 struct Judging<'a> {

@@ -42,7 +42,7 @@ use crate::{
     config_file,
     console::{self, Progress},
     input::Input,
-    simulate::{Outcome, Setup, Simulation},
+    simulate::{Outcome, Setup, Simulation, Successor},
 };
 
 /// The files that windows are taken from where none is given.
@@ -58,6 +58,8 @@ const FAST_PART: f64 = 0.4;
 const STANDBY: Seconds = Seconds(10.0);
 /// The machine is watched for so long after its host is gone: until it is at stand-by, and that is over.
 const WATCHED: Seconds = Seconds(18.0);
+/// The number of the print in its journal.
+const JOURNAL: u32 = 1;
 /// After a clean print there is nothing to be seen.
 const WATCHED_CLEAN: Seconds = Seconds(0.5);
 /// Streams of chance: what is printed, and what goes wrong in the scenario of each number from here on.
@@ -224,17 +226,20 @@ impl Campaign {
             board: Some(case.board.clone()),
             faults: case.faults.clone(),
             seed,
-            options: JobOptions { confirm_all: true, ..JobOptions::default() },
+            options: JobOptions { confirm_all: true, journal: Some(JOURNAL), ..JobOptions::default() },
             consent_after: case.consent_after,
             host_dies: case.host_dies,
+            successor: case.successor.map(|(after, journal_part)| Successor {
+                after,
+                job: Input::memory(&window.name, window.gcode.clone()),
+                journal_part,
+            }),
             watched,
             quiet: true,
         };
         let input = || Input::memory(&window.name, window.gcode.clone());
         let mut simulation = Simulation::new(setup, input(), input())?;
         simulation.run()?;
-        // A host that is to continue where this one ended attaches here: to the machine as it stands, before it is taken
-        // apart for its report.
         let aftermath = simulation.aftermath();
         Ok(Print { report: simulation.into_report(), aftermath })
     }
@@ -272,6 +277,9 @@ fn faults_text(case: &Case) -> String {
     }
     if let Some(at) = case.host_dies {
         let _ = write!(text, "the host dies@{:.4} ", at.0);
+    }
+    if let Some((after, part)) = case.successor {
+        let _ = write!(text, "another comes {:.4} s later with {part:.4} of the journal ", after.0);
     }
     text.trim_end().to_owned()
 }

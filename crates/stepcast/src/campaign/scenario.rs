@@ -20,6 +20,8 @@ const STALL_S: std::ops::Range<f64> = 0.1..60.0;
 const STALL_SHORT_S: f64 = 1.7;
 /// Stalls that a plain board does not sit out.
 const STALL_PLAIN_S: std::ops::Range<f64> = 3.5..60.0;
+/// A host's place is empty for so long.
+const AWAY_S: std::ops::Range<f64> = 0.01..600.0;
 /// The user says yes so long after a hold was shown.
 const CONSENT_S: std::ops::Range<f64> = 0.0..3.0;
 
@@ -42,6 +44,10 @@ pub(crate) enum Scenario {
     Stall,
     /// The host is gone for good
     HostDeath,
+    /// The host is gone, and another takes the print up and goes on
+    TakeUp,
+    /// The same, with a journal that is torn off somewhere
+    TornJournal,
     /// The board starts anew
     BoardReset,
     /// A temperature sensor comes off or is short-circuited
@@ -59,6 +65,8 @@ pub(super) enum Promise {
     SamePulses,
     /// The same steps, after one hold and the user's word.
     SameSteps,
+    /// The same steps, or a refusal with a reason.
+    SameStepsOrRefused,
     /// At rest on the path in time, no step lost, the heaters off.
     AtRest,
     /// The print has failed, with a reason of the catalogue, and the heaters are off.
@@ -75,6 +83,8 @@ pub(super) struct Case {
     pub(super) board: BoardProfile,
     pub(super) faults: Faults,
     pub(super) host_dies: Option<Seconds>,
+    /// Another host takes its place so long after, with so much of its journal.
+    pub(super) successor: Option<(Seconds, f64)>,
     pub(super) consent_after: Option<Seconds>,
     pub(super) promise: Promise,
     /// When the fault happens, where it happens once.
@@ -88,6 +98,7 @@ impl Case {
             board,
             faults: Faults::default(),
             host_dies: None,
+            successor: None,
             consent_after: None,
             promise: Promise::SamePulses,
             at: None,
@@ -110,9 +121,13 @@ impl Scenario {
         match self {
             Self::Flip | Self::PlainHostDeath | Self::PlainStall => Some(true),
             Self::Drop | Self::Duplicate | Self::Delay => None,
-            Self::Corrupt | Self::Stall | Self::HostDeath | Self::BoardReset | Self::SensorFault => {
-                Some(false)
-            }
+            Self::Corrupt
+            | Self::Stall
+            | Self::HostDeath
+            | Self::TakeUp
+            | Self::TornJournal
+            | Self::BoardReset
+            | Self::SensorFault => Some(false),
         }
     }
 
@@ -135,6 +150,14 @@ impl Scenario {
             Self::HostDeath | Self::PlainHostDeath => {
                 (case.host_dies, case.at) = (Some(at), Some(at));
                 case.promise = if self == Self::HostDeath { Promise::AtRest } else { Promise::Shutdown };
+            }
+            Self::TakeUp | Self::TornJournal => {
+                let torn = self == Self::TornJournal;
+                let part = if torn { chance.part() } else { 1.0 };
+                (case.host_dies, case.at) = (Some(at), Some(at));
+                case.successor = Some((Seconds(chance.magnitude(AWAY_S)), part));
+                case.consent_after = Some(Seconds(chance.between(CONSENT_S)));
+                case.promise = if torn { Promise::SameStepsOrRefused } else { Promise::SameSteps };
             }
             Self::BoardReset | Self::SensorFault => {
                 let kind = if self == Self::BoardReset { FailureKind::BoardReset } else { sensor(chance) };

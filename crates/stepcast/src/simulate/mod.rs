@@ -25,7 +25,7 @@ use units::Seconds;
 
 pub(crate) use self::{
     report::{Outcome, Report},
-    run::{Aftermath, PATH_ERROR_MAX_MM, Setup, Simulation},
+    run::{Aftermath, PATH_ERROR_MAX_MM, Setup, Simulation, Successor},
 };
 use crate::{
     check,
@@ -56,6 +56,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
         options: options.clone(),
         consent_after: args.confirm_holds.then_some(Seconds::ZERO),
         host_dies: None,
+        successor: None,
         watched: run::AFTER,
         quiet: false,
     };

@@ -8,6 +8,7 @@ use std::{collections::BTreeMap, time::Instant};
 use printer::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
+    journal::{Journal, JournalError},
     machine::{EXTRUDER, MOTOR_NAMES},
     session::{JobOptions, JobStatus, Request, Session},
 };
@@ -94,10 +95,22 @@ pub(crate) struct Setup {
     pub(crate) consent_after: Option<Seconds>,
     /// The host is gone for good from this time of the board's on.
     pub(crate) host_dies: Option<Seconds>,
+    /// Another host takes its place then.
+    pub(crate) successor: Option<Successor>,
     /// The machine is watched for so long after the end.
     pub(crate) watched: Seconds,
     /// Nothing is shown on the terminal.
     pub(crate) quiet: bool,
+}
+
+/// A host that takes the place of one that is gone.
+pub(crate) struct Successor {
+    /// So long after that.
+    pub(crate) after: Seconds,
+    /// The file, from its beginning.
+    pub(crate) job: Input,
+    /// Of the journal there is only this share; all of it is 1.
+    pub(crate) journal_part: f64,
 }
 
 /// What came of a print whose host is gone, or was held up.
@@ -140,6 +153,9 @@ pub(crate) struct Simulation {
     /// … and until then nothing moves: the last step when the hold was shown.
     held_at: Option<Ticks>,
     host_dies: Option<Ticks>,
+    successor: Option<Successor>,
+    config: PrinterConfig,
+    journal: String,
     /// When the host does nothing: from and until when; soonest last.
     stalls: Vec<(Ticks, Ticks)>,
     stage: Stage,
@@ -159,8 +175,18 @@ pub(crate) struct Simulation {
 impl Simulation {
     /// Powers the machine up. `job` is what the host is fed, `reference` the same, for the path that it should draw.
     pub(crate) fn new(setup: Setup, job: Input, reference: Input) -> anyhow::Result<Self> {
-        let Setup { mut config, board, faults, seed, options, consent_after, host_dies, watched, quiet } =
-            setup;
+        let Setup {
+            mut config,
+            board,
+            faults,
+            seed,
+            options,
+            consent_after,
+            host_dies,
+            successor,
+            watched,
+            quiet,
+        } = setup;
         let board = demo_machine::fit(&mut config, board.as_ref())?;
         let machine = demo_machine::machine(&config)?;
         let step_distances = printer::machine::step_distances(&config).map(|distance| distance.0);
@@ -177,7 +203,7 @@ impl Simulation {
         .map(|(name, standby)| (name, standby.unwrap_or(Celsius(0.0))));
         Ok(Self {
             observer: Observer::new(&config, reference, start, quiet),
-            session: Session::new(config, clock.at(printer.now())),
+            session: Session::new(config.clone(), clock.at(printer.now())),
             clock,
             job,
             job_fed: false,
@@ -186,6 +212,9 @@ impl Simulation {
             consent_at: None,
             held_at: None,
             host_dies: host_dies.map(|at| start + host_hz.ticks_in(at)),
+            successor,
+            config,
+            journal: String::new(),
             stalls: stalls(&faults.host_stalls, start, host_hz),
             stage: Stage::Connecting,
             watched,
@@ -246,6 +275,7 @@ impl Simulation {
         loop {
             let now = self.clock.at(self.printer.now());
             let wake = self.session.poll(now, to_board);
+            self.journal += &self.session.take_journal();
             if !to_board.is_empty() {
                 self.lease.watch(to_board, self.printer.now());
                 self.printer.write(to_board);
@@ -285,6 +315,10 @@ impl Simulation {
                     self.end();
                     Ok(())
                 }
+                Wish::TakeUp => self.take_up(),
+                Wish::Start if self.observer.is_taken_up && self.session.job_status() == JobStatus::None => {
+                    Err(PrinterError::new(ErrorCode::ContinuationRefused, "the board held nothing"))
+                }
                 Wish::Start => Ok(()),
             };
             if let Err(error) = result {
@@ -293,6 +327,33 @@ impl Simulation {
             }
         }
         acted
+    }
+
+    /// The board holds a print: the host that is there now has its journal.
+    fn take_up(&mut self) -> Result<(), PrinterError> {
+        let refused =
+            |error: JournalError| PrinterError::new(ErrorCode::ContinuationRefused, error.to_string());
+        let journal = Journal::read(self.journal.as_bytes()).map_err(refused)?;
+        self.session.take_up(&journal)
+    }
+
+    /// Another host takes the place of the one that is gone, if it is time for that.
+    fn succeed(&mut self, died: Ticks) -> Option<Ticks> {
+        let now = self.printer.now();
+        let at = died + self.ticks(self.successor.as_ref()?.after);
+        if at > now {
+            return Some(at);
+        }
+        let Successor { job, journal_part, .. } = self.successor.take()?;
+        self.host_dies = None;
+        self.job = job;
+        self.job_fed = false;
+        let kept = (self.journal.len() as f64 * journal_part) as usize;
+        // A journal is plain ASCII.
+        self.journal.truncate(kept);
+        self.session = Session::new(self.config.clone(), self.clock.at(now));
+        self.observer.is_taken_up = true;
+        None
     }
 
     /// The user says yes to what is held, once that is due.
@@ -317,7 +378,7 @@ impl Simulation {
 
     /// Feeds the session what it wants of the file.
     fn feed(&mut self) -> Result<bool, PrinterError> {
-        if self.job_fed || self.stage != Stage::Printing || self.session.job_status() == JobStatus::None {
+        if self.job_fed || self.stage != Stage::Printing {
             return Ok(false);
         }
         let wants = self.session.job_wants();
@@ -368,7 +429,10 @@ impl Simulation {
     fn away_until(&mut self) -> Option<Ticks> {
         let now = self.printer.now();
         if self.host_dies.is_some_and(|at| at <= now) {
-            self.aftermath.host_died.get_or_insert(now);
+            let died = *self.aftermath.host_died.get_or_insert(now);
+            if self.stage == Stage::Printing && self.successor.is_some() {
+                return self.succeed(died);
+            }
             self.end();
             let Stage::Watching(until) = self.stage else { return None };
             return Some(until.max(now + self.ticks(SAMPLE_INTERVAL)));
