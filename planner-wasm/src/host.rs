@@ -139,8 +139,11 @@ impl Host {
         let refused =
             |error: JournalError| PrinterError::new(ErrorCode::ContinuationRefused, error.to_string());
         let journal = Journal::read(journal).map_err(refused)?;
-        self.fed_bytes = 0;
-        self.session.take_up(&journal)
+        self.session.take_up(&journal)?;
+        let (line, elapsed) = journal.progress.unwrap_or_default();
+        (self.line, self.elapsed_s, self.fed_bytes) = (line, elapsed.0, 0);
+        self.queued_least = None;
+        Ok(())
     }
 
     fn sort_events(&mut self) {

@@ -89,7 +89,7 @@ export class LockstepLoop {
   #attend(): number {
     const bytes = this.#machine.poll(this.#printer.now());
     if (bytes.byteLength > 0) this.#printer.write(bytes);
-    return this.#machine.session.wake();
+    return this.#machine.wake(this.#printer.now());
   }
 
   #rest(ms: number): Promise<void> {

@@ -120,6 +120,36 @@ export interface PrintFacts {
   readonly lines: number;
 }
 
+/** A print on a real printer that was begun in this browser and has not come to its end, as far as is known. */
+export interface KeptPrint {
+  readonly id: string;
+  readonly facts: PrintFacts;
+  /** What the user calls the machine, and its file. */
+  readonly machine: { readonly name: string; readonly config: string };
+  readonly port: PortId;
+  /** The line of the last move that was seen to be made; 0 where none was. */
+  readonly line: number;
+  /** Print time then. */
+  readonly elapsed: Seconds;
+  /** When it was last heard of, in ms since 1970. */
+  readonly heardOf: number;
+  /** The size of its file. */
+  readonly fileBytes: number;
+}
+
+/** The print that the board holds, and what there is to be done about it. Nothing of all this moves anything. */
+export type HeldPrint =
+  | { readonly kind: 'looking' }
+  /** Nothing is known of it here; `trouble` says why, where that is out of order. */
+  | { readonly kind: 'unknown'; readonly trouble: Trouble | null }
+  /** The copy of its file is not there, or not whole. */
+  | { readonly kind: 'needs-file'; readonly print: KeptPrint; readonly trouble: Trouble | null }
+  /** Its plan is made again, up to where the board is. */
+  | { readonly kind: 'finding'; readonly print: KeptPrint; readonly share: Share }
+  | { readonly kind: 'refused'; readonly print: KeptPrint; readonly trouble: Trouble }
+  /** It is the session's job again, and waits for the user's word. */
+  | { readonly kind: 'held'; readonly print: KeptPrint; readonly file: Blob };
+
 /** Lines that the user wants left out; all that are not known, where there are more than can be listed. */
 export type ConfirmedLines = readonly number[] | 'all';
 
@@ -142,6 +172,12 @@ export type ToMachine =
       readonly confirmedLines: ConfirmedLines;
       readonly facts: PrintFacts;
     }
+  /** The file of the print that the board holds, from the user. */
+  | { readonly kind: 'held-file'; readonly file: Blob }
+  /** Nothing of this print is to be kept. */
+  | { readonly kind: 'forget'; readonly id: string }
+  /** Another tab may have changed what is kept. */
+  | { readonly kind: 'list-kept' }
   | { readonly kind: 'speed'; readonly speed: number }
   /** A snapshot has arrived: the next may be sent. */
   | { readonly kind: 'seen' }
@@ -169,6 +205,12 @@ export type FromMachine =
    */
   | { readonly kind: 'planned-speed'; readonly pairs: Float64Array<ArrayBuffer> }
   | { readonly kind: 'events'; readonly events: readonly MachineEvent[] }
+  /** Prints that were interrupted, the newest first; those that are under way are not among them. */
+  | { readonly kind: 'kept'; readonly prints: readonly KeptPrint[] }
+  /** What is kept of the present print is not enough to go on with it after this page; said once. */
+  | { readonly kind: 'not-kept'; readonly trouble: Trouble }
+  /** Null once there is nothing more to be decided. */
+  | { readonly kind: 'held-print'; readonly held: HeldPrint | null }
   /** What came of a wish or of a print's start. */
   | { readonly kind: 'answer'; readonly id: number; readonly trouble: Trouble | null }
   /** The worker's clock jumped: the computer slept, or the worker was held up. */

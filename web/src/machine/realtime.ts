@@ -71,7 +71,7 @@ export class RealTimeLoop {
     const bytes = machine.poll(now());
     // Errors are told by the transport's `lost`; how much may be under way is bounded by the link's window.
     if (bytes.byteLength > 0) this.#writer.write(bytes).catch(() => undefined);
-    this.#wake = machine.session.wake();
+    this.#wake = machine.wake(now());
     this.#timer = setTimeout(this.tick, Math.max(0, (this.#wake - now()) * 1000));
   }
 

@@ -1,8 +1,11 @@
 // Prints kept in the origin's private file system, so that they outlive the page: for each a journal that only grows,
-// and a copy of its file. Runs in the worker, where files can be written in place and at once.
+// what is to be known about it, and a copy of its file. Runs in the worker, where files can be written in place and at
+// once.
 //
-// Knows nothing of what a journal says. Layout: prints/<id>/journal, prints/<id>/file, and prints/<id>/complete once
-// the copy is. Bounded: so many prints, so long a journal; the oldest prints go first. Sizes in bytes.
+// Knows nothing of what a journal says. Layout: prints/<id>/journal, prints/<id>/about, prints/<id>/file, and
+// prints/<id>/complete with the copy's size and CRC-32 once it is whole. Bounded: so many prints, so long a journal; the
+// oldest prints go first. Sizes in bytes.
+import { Crc32 } from './crc32';
 
 /** Prints that are kept, the one that is open included. */
 export const PRINTS_MAX = 8;
@@ -14,6 +17,9 @@ const FOLDER = 'prints';
 const JOURNAL = 'journal';
 const FILE = 'file';
 const COMPLETE = 'complete';
+const ABOUT = 'about';
+/** More than that is to be known about no print. */
+const ABOUT_BYTES_MAX = 4 * 1024 * 1024;
 const ID = /^[A-Za-z0-9-]{1,64}$/;
 
 export type StorageCode =
@@ -119,6 +125,17 @@ export class OpenPrint {
     }
   }
 
+  /** Only so many bytes of the journal stay: what follows them cannot be read, and nothing behind it could be. */
+  keepJournal(bytes: number): void {
+    this.#end = Math.min(this.#end, bytes);
+    this.#cut();
+  }
+
+  /** Writes down what is to be known about the print, in the place of what was. */
+  async describe(about: Uint8Array): Promise<void> {
+    await tried(async () => writeWhole(this.#folder, ABOUT, about));
+  }
+
   #cut(): void {
     try {
       this.#journal.truncate(this.#end);
@@ -127,7 +144,7 @@ export class OpenPrint {
     }
   }
 
-  /** Keeps a copy of the print's file, in pieces; `progress` is told the bytes so far. */
+  /** Keeps a copy of the print's file, in pieces; `progress` is told the bytes so far, and may throw to break it off. */
   async copyFile(
     stream: ReadableStream<Uint8Array>,
     progress: (bytes: number) => void = () => undefined,
@@ -135,16 +152,8 @@ export class OpenPrint {
     await tried(async () => {
       // What was said of an older copy does not hold any more.
       await this.#folder.removeEntry(COMPLETE).catch(ignoreMissing);
-      const bytes = await fill(await openSync(this.#folder, FILE), stream, progress);
-      const mark = await openSync(this.#folder, COMPLETE);
-      try {
-        const text = new TextEncoder().encode(String(bytes));
-        mark.truncate(0);
-        writeAll(mark, text, 0);
-        mark.flush();
-      } finally {
-        mark.close();
-      }
+      const mark = await fill(await openSync(this.#folder, FILE), stream, progress);
+      await writeWhole(this.#folder, COMPLETE, new TextEncoder().encode(mark));
     });
   }
 
@@ -155,12 +164,29 @@ export class OpenPrint {
   }
 }
 
+/** A small file, on the disk when it returns. */
+async function writeWhole(folder: FileSystemDirectoryHandle, name: string, bytes: Uint8Array): Promise<void> {
+  const file = await openSync(folder, name);
+  try {
+    file.truncate(0);
+    writeAll(file, bytes, 0);
+    file.flush();
+  } finally {
+    file.close();
+  }
+}
+
+/** What is written down of a copy: its size and its check. */
+const markOf = (bytes: number, crc: Crc32): string => `${bytes} ${crc.text}`;
+
+/** Fills the file; its mark. */
 async function fill(
   file: SyncFile,
   stream: ReadableStream<Uint8Array>,
   progress: (bytes: number) => void,
-): Promise<number> {
+): Promise<string> {
   const reader = stream.getReader();
+  const crc = new Crc32();
   let bytes = 0;
   try {
     file.truncate(0);
@@ -168,11 +194,12 @@ async function fill(
       const { value, done } = await reader.read();
       if (done) break;
       writeAll(file, value, bytes);
+      crc.add(value);
       bytes += value.byteLength;
       progress(bytes);
     }
     file.flush();
-    return bytes;
+    return markOf(bytes, crc);
   } catch (error) {
     await reader.cancel(error).catch(() => undefined);
     throw error;
@@ -254,13 +281,27 @@ export class PrintStore {
     });
   }
 
-  /** The whole copy of the print's file; `incomplete` where there is none. */
+  /** What was written down about the print. */
+  async readAbout(id: string): Promise<Uint8Array<ArrayBuffer>> {
+    return await tried(async () => {
+      const about = await (await (await this.#folder(id)).getFileHandle(ABOUT)).getFile();
+      if (about.size > ABOUT_BYTES_MAX) throw new StorageError('broken');
+      return new Uint8Array(await about.arrayBuffer());
+    });
+  }
+
+  /** The copy of the print's file, read through and found to be as it was; `incomplete` where there is none. */
   async openFile(id: string): Promise<File> {
     return await tried(async () => {
       const folder = await this.#folder(id);
-      const size = await copiedBytes(folder);
-      if (size === null) throw new StorageError('incomplete');
-      return await (await folder.getFileHandle(FILE)).getFile();
+      const mark = await markIn(folder);
+      if (mark === null) throw new StorageError('incomplete');
+      const file = await (await folder.getFileHandle(FILE)).getFile();
+      const crc = new Crc32();
+      const reader = file.stream().getReader();
+      for (let piece = await reader.read(); !piece.done; piece = await reader.read()) crc.add(piece.value);
+      if (mark !== markOf(file.size, crc)) throw new StorageError('incomplete');
+      return file;
     });
   }
 
@@ -271,16 +312,22 @@ export class PrintStore {
   }
 }
 
-/** The size of the copy where it is whole, else null. */
-async function copiedBytes(folder: FileSystemDirectoryHandle): Promise<number | null> {
+/** What was written down of the copy once it was whole; else null. */
+async function markIn(folder: FileSystemDirectoryHandle): Promise<string | null> {
   try {
-    const mark = await (await (await folder.getFileHandle(COMPLETE)).getFile()).text();
-    const { size } = await (await folder.getFileHandle(FILE)).getFile();
-    return mark === String(size) ? size : null;
+    return await (await (await folder.getFileHandle(COMPLETE)).getFile()).text();
   } catch (error) {
     ignoreMissing(error);
     return null;
   }
+}
+
+/** The size of the copy where it is whole, else null. */
+async function copiedBytes(folder: FileSystemDirectoryHandle): Promise<number | null> {
+  const mark = await markIn(folder);
+  if (mark === null) return null;
+  const { size } = await (await folder.getFileHandle(FILE)).getFile();
+  return mark.startsWith(`${size} `) ? size : null;
 }
 
 async function describe(id: string, folder: FileSystemDirectoryHandle): Promise<StoredPrint> {

@@ -208,3 +208,21 @@ export function storageTrouble(code: StorageCode, error: unknown): Trouble {
     todo,
   );
 }
+
+/** Without the copy of the file; the journal is kept all the same. */
+export const copyMissing = (code: StorageCode): Trouble =>
+  trouble(
+    'copy-missing',
+    `The print\u2019s file could not be copied. (${code === 'full' ? 'there is no room' : STORAGE[code][0].replace(/\.$/, '')})`,
+    'The print itself is not touched. To go on with it after this page is gone, its file would have to be opened again.',
+    'Keep the file as it is until the print is done.',
+  );
+
+/** The user gave a file that cannot be the one. */
+export const otherFile = (name: string): Trouble =>
+  trouble(
+    'other-file',
+    `That is not the file that was being printed: ${name} has another size.`,
+    'Nothing was sent to the printer; the board goes on holding the print.',
+    'Open the very file that the print was started with; one that was sliced again does not fit.',
+  );

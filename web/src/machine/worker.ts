@@ -6,13 +6,16 @@ import { ANSWER_BYTES_MAX, classify } from '../transport/answer';
 import { NO_LINE_ERRORS, PortError } from '../transport/transport';
 import { find, openSerial } from '../transport/web_serial';
 import { type Seconds, seconds } from '../units';
+import { Archive, type PrintLog } from './archive';
 import { Broadcast } from './broadcast';
 import { Connection, Died, type Parts } from './connection';
+import { Continuation } from './continuation';
 import { LockstepLoop } from './lockstep';
-import { Machine } from './machine';
+import { type Keeping, Machine } from './machine';
 import { loadPlanner, type Planner } from './planner';
-import type { FromMachine, PortChoice, Snapshot, ToMachine, Trouble, Wish } from './protocol';
+import type { FromMachine, PortChoice, PrintFacts, Snapshot, ToMachine, Trouble, Wish } from './protocol';
 import { RealTimeLoop } from './realtime';
+import { PrintStore } from './storage';
 import { answerTrouble, plannerMissing, portInUse, portTrouble, stopNotSent } from './troubles';
 
 /** Errors for which the first bytes may know a better reason. */
@@ -21,16 +24,24 @@ const UNIDENTIFIED = new Set(['board-silent', 'board-unreadable', 'wrong-firmwar
 const scope = self as unknown as { postMessage(message: FromMachine, transfer: Transferable[]): void };
 const realNow = (): Seconds => seconds(performance.now() / 1000);
 
+type Connect = ToMachine & { kind: 'connect' };
+
 let planner: Planner | undefined;
+/** Prints on real printers; one on a virtual printer is gone with the page, and its printer with it. */
+let archive: Archive | undefined;
+/** Of a print that the board of the present connection holds. */
+let continuation: Continuation | undefined;
+/** What the page was last told of prints that are kept; one list after the other. */
+let listing: Promise<void> = Promise.resolve();
 let connection: Connection | undefined;
+/** What it was made with. */
+let present: Connect | undefined;
 /** Tells other tabs of the connection. */
 let broadcast: Broadcast | undefined;
 /** From before the port is opened until after it is closed. */
 let opening: { cancelled: boolean } | undefined;
 /** Whether the page shows the planned speed; outlives connections. */
 let watchesSpeed = false;
-
-type Connect = ToMachine & { kind: 'connect' };
 
 function tell(message: FromMachine): void {
   broadcast?.note(message);
@@ -90,6 +101,7 @@ function broadcastOf({ id, name, port }: Connect, current: Connection): Broadcas
 async function hold(message: Connect, parts: Parts): Promise<Trouble | null> {
   parts.machine.watchesSpeed = watchesSpeed;
   connection = new Connection(parts, tell);
+  present = message;
   broadcast = broadcastOf(message, connection);
   let trouble: Trouble | null = null;
   try {
@@ -99,6 +111,7 @@ async function hold(message: Connect, parts: Parts): Promise<Trouble | null> {
     broadcast.end(trouble);
     broadcast = undefined;
     connection = undefined;
+    present = undefined;
   }
 }
 
@@ -123,27 +136,68 @@ async function connectSerial(
       return null;
     }
     const first = new FirstBytes();
+    const prints = archiveOf(loaded);
     const machine = new Machine(
       session,
       (message) => tell(first.explain(message)),
       () => transport.lineErrors(),
+      keepingIn(prints),
     );
     const loop = new RealTimeLoop(transport, {
       machine,
       now: realNow,
       onBytes: (bytes) => first.take(bytes),
     });
-    return await hold(message, {
+    continuation = new Continuation({
       machine,
-      now: realNow,
+      archive: prints,
+      tell: (held) => tell({ kind: 'held-print', held }),
+      tellNotKept,
+      onTakenUp: ({ facts }) => broadcast?.begins(facts),
       tick: loop.tick,
-      setSpeed: () => undefined,
-      record: null,
-      lost: transport.lost.then(portTrouble),
-      start: (onFailure) => loop.start(onFailure),
-      stop: () => loop.stop(),
     });
+    try {
+      return await hold(message, {
+        machine,
+        now: realNow,
+        tick: loop.tick,
+        setSpeed: () => undefined,
+        record: null,
+        lost: transport.lost.then(portTrouble),
+        start: (onFailure) => loop.start(onFailure),
+        stop: () => loop.stop(),
+      });
+    } finally {
+      continuation?.stop();
+      continuation = undefined;
+      await machine.logClosed();
+    }
   });
+}
+
+const archiveOf = (loaded: Planner): Archive => {
+  archive ??= new Archive(new PrintStore(), loaded.readJournal);
+  return archive;
+};
+
+const tellNotKept = (trouble: Trouble): void => tell({ kind: 'not-kept', trouble });
+
+const keepingIn = (prints: Archive): Keeping => ({
+  onEvent: (event) => continuation?.note(event),
+  onTell: () => continuation?.progress(),
+  settle: (log, isLost) => prints.settle(log, isLost).then(tellKept),
+});
+
+/** Tells the page which prints were interrupted. */
+function tellKept(): void {
+  listing = listing.then(async () => {
+    if (planner) tell({ kind: 'kept', prints: await archiveOf(planner).list() });
+  });
+}
+
+async function forget(id: string): Promise<void> {
+  if (planner) await archiveOf(planner).forget(id);
+  tellKept();
 }
 
 async function connectVirtual(
@@ -181,6 +235,7 @@ async function connect(message: Connect): Promise<void> {
     // Only now, with port and lock let go of, may the page ask for the next connection.
     opening = undefined;
     tell({ kind: 'closed', trouble });
+    tellKept();
   } catch (error) {
     died(error);
   }
@@ -227,12 +282,24 @@ function wish(id: number, wanted: Wish): void {
   tell({ kind: 'answer', id, trouble: isStop ? stopNotSent('not-open') : null });
 }
 
+/** Where the present connection keeps what is needed to go on with the print after this page is gone; null for nothing. */
+async function recordFor(facts: PrintFacts, file: Blob): Promise<PrintLog | null> {
+  if (!archive || present?.port.kind !== 'serial') return null;
+  const { name, config, port } = present;
+  const about = { facts, machine: { name, config }, port: port.id, fileBytes: file.size };
+  return await archive.begin(about, tellNotKept);
+}
+
 async function print({ id, file, confirmedLines, facts }: ToMachine & { kind: 'print' }): Promise<void> {
   const current = connection;
   const parts = current?.parts;
   if (!current || !parts) return tell({ kind: 'answer', id, trouble: null });
   try {
-    const trouble = await parts.machine.print(file, confirmedLines, parts.now);
+    const trouble = await parts.machine.print(file, confirmedLines, parts.now, async () => {
+      const log = await recordFor(facts, file);
+      if (log) archive?.copy(log, file);
+      return log;
+    });
     if (trouble === null) broadcast?.begins(facts);
     tell({ kind: 'answer', id, trouble });
   } catch (error) {
@@ -255,6 +322,15 @@ self.onmessage = ({ data }: MessageEvent<ToMachine>): void => {
       break;
     case 'print':
       void print(data);
+      break;
+    case 'held-file':
+      continuation?.give(data.file);
+      break;
+    case 'forget':
+      void forget(data.id);
+      break;
+    case 'list-kept':
+      tellKept();
       break;
     case 'speed':
       connection?.attempt(({ setSpeed }) => setSpeed(data.speed));
@@ -279,6 +355,9 @@ self.addEventListener('unhandledrejection', (event) => {
 });
 
 load().then(
-  () => tell({ kind: 'loaded' }),
+  () => {
+    tell({ kind: 'loaded' });
+    tellKept();
+  },
   (error: unknown) => tell({ kind: 'closed', trouble: plannerMissing(error) }),
 );

@@ -7,6 +7,7 @@ import { isViewing } from '../state/watched';
 import { ConnectDialog } from './connect_dialog';
 import { Console } from './console';
 import { openDialog } from './dialogs';
+import { HeldDialog } from './held_dialog';
 import { Instruments } from './instruments';
 import { Job } from './job';
 import { MachineDialog } from './machine_dialog';
@@ -87,6 +88,7 @@ export function App(): JSX.Element {
       {openDialog.value === 'connect' && <ConnectDialog />}
       {openDialog.value === 'machine' && <MachineDialog />}
       {openDialog.value === 'settings' && <SettingsDialog />}
+      <HeldDialog />
       <Asked />
     </>
   );

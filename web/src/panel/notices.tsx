@@ -4,7 +4,7 @@ import { type Notice, notices, withdraw } from '../state/notices';
 import { Button } from './parts';
 
 function Line({ notice }: { readonly notice: Notice }): JSX.Element {
-  const { kind, text, action, onClosed } = notice;
+  const { kind, text, action, other, onClosed } = notice;
   return (
     <li class="notice">
       <span class="grow">{text}</span>
@@ -13,6 +13,7 @@ function Line({ notice }: { readonly notice: Notice }): JSX.Element {
           {action.text}
         </Button>
       )}
+      {other && <Button onClick={other.act}>{other.text}</Button>}
       <Button
         icon="close"
         kind="quiet"

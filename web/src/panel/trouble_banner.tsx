@@ -1,7 +1,7 @@
 // What went wrong, in three parts, with the action that comes next.
 import type { JSX } from 'preact';
 import type { Trouble } from '../machine/protocol';
-import { connection, isHolding, isShutdown, snapshot, trouble, wish } from '../state/machine';
+import { connection, isShutdown, snapshot, trouble, wish } from '../state/machine';
 import { mayReconnect, reconnect } from '../state/reconnect';
 import { openDialog } from './dialogs';
 import { Icon } from './icons';
@@ -11,7 +11,7 @@ import { Button } from './parts';
 const CONNECTABLE = new Set(['driver-gone']);
 
 function Restart(): JSX.Element | null {
-  if (!isShutdown.value && !isHolding.value) return null;
+  if (!isShutdown.value) return null;
   return (
     <Button kind="primary" onClick={() => void wish({ kind: 'firmware-restart' })}>
       Restart the board
@@ -47,15 +47,10 @@ function Short({ text }: { readonly text: string }): JSX.Element {
 }
 
 const STOPPED = 'The board has stopped.';
-const HOLDING =
-  'The board holds a print whose page is gone: the head rests on its path. Restart the board to end that print, then home.';
-
-/** What is said of a board that waits for its user without a message of its own. */
-const standing = (): string | null => (isShutdown.value ? STOPPED : isHolding.value ? HOLDING : null);
 
 /** What lies behind a dialog is not read and cannot be reached: the trouble is told in it, too. */
 export function TroubleInDialog(): JSX.Element {
-  const text = trouble.value?.happened ?? standing();
+  const text = trouble.value?.happened ?? (isShutdown.value ? STOPPED : null);
   return (
     <div role="alert" class="alert-place">
       {text !== null && <Short text={text} />}
@@ -65,10 +60,9 @@ export function TroubleInDialog(): JSX.Element {
 
 export function TroubleBanner(): JSX.Element | null {
   const current = trouble.value;
-  const text = standing();
   return (
     <div role="alert" class="alert-place">
-      {!current && text !== null && <Short text={text} />}
+      {!current && isShutdown.value && <Short text={STOPPED} />}
       {current && (
         <div class={`trouble ${isShutdown.value || snapshot.value?.phase === 'failed' ? 'severe' : ''}`}>
           <Icon name="warning" />

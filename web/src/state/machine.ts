@@ -15,8 +15,10 @@ import type {
 } from '../machine/protocol';
 import { plannerMissing, portTrouble, stopNotSent, workerDied } from '../machine/troubles';
 import { stalled } from './incidents';
+import { heldPrint, keptPrints } from './kept';
 import { forgetLineErrors, noteLineErrors } from './line_errors';
 import { note } from './log';
+import { notify, withdraw } from './notices';
 import type { Profile } from './profiles';
 
 export type ConnectionState = 'closed' | 'opening' | 'open';
@@ -115,6 +117,7 @@ function closed(reason: Trouble | null): void {
   connection.value = 'closed';
   port.value = null;
   snapshot.value = null;
+  heldPrint.value = null;
   plannedSpeed.value = new Float64Array();
   firmware.value = null;
   news();
@@ -164,6 +167,18 @@ function take(message: FromMachine): void {
     case 'events':
       for (const event of message.events) happened(event);
       break;
+    case 'kept':
+      keptPrints.value = message.prints;
+      break;
+    case 'held-print':
+      if (connection.value === 'open') heldPrint.value = message.held;
+      break;
+    case 'not-kept': {
+      const { happened, safe, todo } = message.trouble;
+      note('warning', happened);
+      notify({ kind: 'not-kept', text: `${happened} ${safe} ${todo}` });
+      break;
+    }
     case 'answer': {
       waiting.get(message.id)?.(message.trouble);
       waiting.delete(message.id);
@@ -249,6 +264,13 @@ function happened(event: MachineEvent): void {
   }
 }
 
+/** The file of the print that the board holds, where the page has no copy of it. */
+export const giveHeldFile = (file: Blob): void => send({ kind: 'held-file', file });
+/** Nothing of an interrupted print is to be kept. */
+export const forgetPrint = (id: string): void => send({ kind: 'forget', id });
+/** Another tab may have changed which prints are kept. */
+export const lookForPrints = (): void => send({ kind: 'list-kept' });
+
 /** Of this tab's connection, the present or the last one. */
 export const connectionId = signal('');
 
@@ -297,6 +319,7 @@ export async function wish(wanted: Wish): Promise<boolean> {
 
 export async function print(file: Blob, facts: PrintFacts, confirmedLines: ConfirmedLines): Promise<boolean> {
   outcome.value = null;
+  withdraw('not-kept');
   isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, facts, confirmedLines })));
   return isBegun;
 }

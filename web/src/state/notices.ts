@@ -6,6 +6,8 @@ export interface Notice {
   readonly text: string;
   /** What may be done about it, as the button says it; why it cannot be done now, if so. */
   readonly action?: { readonly text: string; readonly act: () => void; readonly why: string | null };
+  /** What else may be done. */
+  readonly other?: { readonly text: string; readonly act: () => void };
   /** It was put away by the user. */
   readonly onClosed?: () => void;
 }

@@ -199,7 +199,6 @@ fn a_homing_move_that_its_trigger_cuts_short_hides_nothing_behind_it() {
     for count in 1..=8 {
         bad.pulse(0, Ticks(51_000 + count as u64 * 1000), count);
     }
-    bad.finish();
     assert_eq!(bad.worst().line, 2);
     assert!(bad.worst().distance_mm > 6.0 * STEP_MM, "{:?}", bad.worst());
 }
