@@ -2,6 +2,7 @@
 //!
 //! * [`vlq`]: the variable-length integers that everything is made of.
 //! * [`block`]: framing, CRC and resynchronisation.
+//! * [`check`]: the stronger check that blocks may carry.
 //! * [`messages`]: every command and response, declared once; host and board both work from that declaration.
 //! * [`rows`]: the check over the rows of steps that a stepper has taken.
 //! * `dictionary` (feature `dictionary`, needs an allocator): the self-description that a board hands to its host.
@@ -16,6 +17,7 @@
 extern crate alloc;
 
 pub mod block;
+pub mod check;
 #[cfg(feature = "dictionary")]
 pub mod dictionary;
 pub mod messages;

@@ -6,6 +6,9 @@
 
 use crate::vlq::{self, Sink};
 
+#[cfg(test)]
+mod tests;
+
 /// Why a message could not be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DecodeError {
@@ -329,12 +332,37 @@ messages! {
     HeaterLease "heater_lease" { alive: u32 }
     /// Asks for the state of a heater.
     HeaterGetState "heater_get_state" { oid: u8 }
+
+    // The block check, an extension of ours (docs/block-check.md).
+    /// The CRC-32 over all of the block before it; from the first right one on the board takes no block without.
+    BlockCheck "block_check" { crc: u32 }
+}
+
+/// What plain Klipper firmware lacks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extension {
+    /// The motion clock: hold, resume and lease.
+    MotionClock,
+    /// Heaters that the board regulates.
+    Heaters,
+    /// The check over whole blocks.
+    BlockCheck,
 }
 
 impl CommandKind {
+    /// The extension that this command belongs to; `None` for those of plain Klipper firmware.
+    pub const fn extension(self) -> Option<Extension> {
+        match self {
+            Self::BlockCheck => Some(Extension::BlockCheck),
+            _ if self.is_heater() => Some(Extension::Heaters),
+            _ if self as u16 >= Self::MotionLease as u16 => Some(Extension::MotionClock),
+            _ => None,
+        }
+    }
+
     /// Whether a board with plain Klipper firmware lacks this command.
     pub const fn is_extension(self) -> bool {
-        self as u16 >= Self::MotionLease as u16
+        self.extension().is_some()
     }
 
     /// Whether it belongs to the heaters that a board regulates.
@@ -384,74 +412,20 @@ messages! {
     // Heaters, as above.
     /// What a heater read at `clock`, what it is held at, its power, and why.
     HeaterState "heater_state" { oid: u8, clock: u32, temperature: i32, target: i32, power: u16, state: u8 }
+
+    // The block check, as above.
+    /// The CRC-32 over all of the block before it.
+    BlockChecked "block_checked" { crc: u32 }
 }
 
 impl ResponseKind {
-    /// Whether a board with plain Klipper firmware lacks this message.
-    pub const fn is_extension(self) -> bool {
-        self as u16 >= Self::MotionState as u16
-    }
-
-    /// Whether it belongs to the heaters that a board regulates.
-    pub const fn is_heater(self) -> bool {
-        matches!(self, Self::HeaterState)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use alloc::{vec, vec::Vec};
-    use proptest::prelude::*;
-
-    #[test]
-    fn numbers_are_unique_and_the_fixed_ones_are_right() {
-        let commands = CommandKind::ALL.iter().map(|kind| kind.spec().id);
-        let mut ids: Vec<u16> = commands.chain(ResponseKind::ALL.iter().map(|kind| kind.spec().id)).collect();
-        ids.sort_unstable();
-        let all = ids.len();
-        ids.dedup();
-        assert_eq!(ids.len(), all);
-        assert!(ids.iter().all(|&id| id < 96), "all numbers travel as one byte");
-        assert_eq!(CommandKind::Identify.spec().id, 1);
-        assert_eq!(ResponseKind::IdentifyResponse.spec().id, 0);
-    }
-
-    #[test]
-    fn a_value_beyond_its_type_is_an_error() {
-        let mut bytes = Vec::new();
-        vlq::encode(i32::from(CommandKind::AllocateOids.spec().id), &mut bytes);
-        vlq::encode(256, &mut bytes);
-        assert_eq!(Command::decode(&mut &bytes[..]), Err(DecodeError::OutOfRange));
-    }
-
-    #[test]
-    fn an_unknown_number_is_an_error() {
-        let mut bytes = Vec::new();
-        vlq::encode(60, &mut bytes);
-        assert_eq!(Command::decode(&mut &bytes[..]), Err(DecodeError::UnknownId(60)));
-        assert_eq!(Response::decode(&mut &bytes[..]), Err(DecodeError::UnknownId(60)));
-    }
-
-    proptest! {
-        #[test]
-        fn messages_come_back_as_they_went(oid: u8, interval: u32, count: u16, add: i16, data: Vec<u8>) {
-            let step = Command::QueueStep { oid, interval, count, add };
-            let reply = Response::AnalogInState { oid, next_clock: interval, values: &data };
-            let mut bytes = vec![];
-            prop_assert!(step.encode(&mut bytes));
-            prop_assert_eq!(Command::decode(&mut &bytes[..]), Ok(step));
-            bytes.clear();
-            prop_assert!(reply.encode(&mut bytes));
-            prop_assert_eq!(Response::decode(&mut &bytes[..]), Ok(reply));
-        }
-
-        #[test]
-        fn garbage_is_an_error_and_never_a_panic(bytes: Vec<u8>) {
-            let mut rest = &bytes[..];
-            while Command::decode(&mut rest).is_ok() && !rest.is_empty() {}
-            let mut rest = &bytes[..];
-            while Response::decode(&mut rest).is_ok() && !rest.is_empty() {}
+    /// The extension that this message belongs to; `None` for those of plain Klipper firmware.
+    pub const fn extension(self) -> Option<Extension> {
+        match self {
+            Self::BlockChecked => Some(Extension::BlockCheck),
+            Self::HeaterState => Some(Extension::Heaters),
+            _ if self as u16 >= Self::MotionState as u16 => Some(Extension::MotionClock),
+            _ => None,
         }
     }
 }

@@ -3,9 +3,7 @@
 //! CRC-32/ISO-HDLC (reflected 0x04c11db7, start and final xor all ones) over nine bytes a row, little-endian, in the order
 //! in which the board took the rows: `interval` (4), `count` (2), `add` (2), direction (1: 0 or 1). No rows give 0.
 
-use crc::{CRC_32_ISO_HDLC, Crc, Table};
-
-static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+use crate::check::CRC_32;
 
 const ROW_BYTES: usize = 9;
 
@@ -32,7 +30,7 @@ impl RowCheck {
         row[6..8].copy_from_slice(&add.to_le_bytes());
         row[8] = forward.into();
         // The register is the value without its final xor, in the order of bits in which the algorithm states it.
-        let mut digest = CRC.digest_with_initial((!self.0).reverse_bits());
+        let mut digest = CRC_32.digest_with_initial((!self.0).reverse_bits());
         digest.update(&row);
         self.0 = digest.finalize();
     }
@@ -62,7 +60,7 @@ mod tests {
                 bytes.push(forward.into());
                 check = RowCheck::from_value(check.value());
             }
-            prop_assert_eq!(check.value(), CRC.checksum(&bytes));
+            prop_assert_eq!(check.value(), CRC_32.checksum(&bytes));
         }
     }
 }

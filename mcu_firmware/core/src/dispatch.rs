@@ -1,7 +1,7 @@
 //! What each command does. Bad values and bad timing are returned as the reason to shut down.
 
 use units::Clock32;
-use wire::{Command, Response, ShutdownReason};
+use wire::{Command, Response, ShutdownReason, messages::Extension};
 
 use crate::{
     analog_in::{AnalogIn, Sampling},
@@ -15,8 +15,8 @@ use crate::{
     trsync::Trsync,
 };
 
-/// The most dictionary bytes in one `identify_response`, so that it fits a block whatever its offset.
-const IDENTIFY_BYTES_MAX: u8 = 50;
+/// The most dictionary bytes in one `identify_response`, so that it fits a block whatever its offset, check and all.
+const IDENTIFY_BYTES_MAX: u8 = 46;
 
 impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     pub(crate) fn dispatch(
@@ -24,11 +24,12 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         board: &mut impl Board,
         command: Command<'_>,
     ) -> Result<(), ShutdownReason> {
-        if command.kind().is_heater() {
-            return self.dispatch_heater(board, &command);
-        }
-        if command.kind().is_extension() {
-            return self.dispatch_motion(board, &command);
+        match command.kind().extension() {
+            None => {}
+            Some(Extension::Heaters) => return self.dispatch_heater(board, &command),
+            Some(Extension::MotionClock) => return self.dispatch_motion(board, &command),
+            // What a block may end in is nothing to be done, and unknown to a board without the block check.
+            Some(Extension::BlockCheck) => return Err(ShutdownReason::CommandParser),
         }
         match command {
             Command::Identify { .. }

@@ -49,18 +49,31 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
         self
     }
 
-    /// As a board with plain Klipper firmware: the motion clock is the hardware clock, and its commands do not exist.
+    /// Without a motion clock: it is the hardware clock, and its commands do not exist.
     #[must_use]
     pub const fn without_motion_clock(mut self) -> Self {
         self.core.has_motion_clock = false;
         self
     }
 
-    /// As a board that leaves temperature loops to its host, as plain Klipper firmware does.
+    /// As a board that leaves temperature loops to its host.
     #[must_use]
     pub const fn without_heaters(mut self) -> Self {
         self.core.has_heaters = false;
         self
+    }
+
+    /// As a board that knows no check over blocks but the framing's own.
+    #[must_use]
+    pub const fn without_block_check(mut self) -> Self {
+        self.core.receiver.without_check();
+        self
+    }
+
+    /// As a board with plain Klipper firmware, which has none of these.
+    #[must_use]
+    pub const fn plain(self) -> Self {
+        self.without_motion_clock().without_heaters().without_block_check()
     }
 
     /// Takes bytes from the host, in pieces of any size: answers and obeys.
@@ -156,23 +169,32 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     }
 
     fn frame(&mut self, board: &mut impl Board, frame: Frame<'_>) {
-        if let Frame::Block { sequence, payload } = frame
-            && self.receiver.accept(sequence)
-        {
-            self.obey(board, payload);
+        match frame {
+            Frame::Block { sequence, payload } => {
+                if let Some(messages) = self.receiver.accept(sequence, payload) {
+                    self.obey(board, sequence, messages);
+                }
+            }
+            Frame::Garbage => self.receiver.garbage(),
         }
         self.receiver.acknowledge(board);
     }
 
     /// Obeys the messages of one block, in order.
-    fn obey(&mut self, board: &mut impl Board, mut payload: &[u8]) {
+    fn obey(&mut self, board: &mut impl Board, sequence: u8, messages: &[u8]) {
         let mut refused = false;
-        while !payload.is_empty() {
+        let mut rest = messages;
+        while !rest.is_empty() {
             // What follows a message that does not decode cannot be understood either.
-            let Ok(command) = Command::decode(&mut payload) else {
+            let Ok(command) = Command::decode(&mut rest) else {
                 self.shut_down(board, ShutdownReason::CommandParser);
                 return;
             };
+            if matches!(command, Command::BlockCheck { .. })
+                && self.receiver.met_check(sequence, messages, rest)
+            {
+                continue;
+            }
             if self.halt.reason().is_some() && !is_allowed(&command) {
                 // Once a block is enough: a block may hold many commands.
                 if !refused && let Some(refusal) = self.halt.refusal() {
@@ -425,6 +447,10 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
                 Object::AnalogIn(input) if input.report_pending => {
                     let _ = self.receiver.send(board, &input.report(oid));
                     input.report_done();
+                }
+                Object::Stepper(stepper) if stepper.report_pending => {
+                    stepper.report_pending = !self.receiver.send(board, &stepper.progress(oid, self.job));
+                    self.reports_pending |= stepper.report_pending;
                 }
                 Object::Trsync(trsync) if trsync.report_pending => {
                     trsync.report_pending = false;

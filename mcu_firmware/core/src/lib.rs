@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `board` | what is asked of a chip |
 //! | `firmware`, `dispatch` | the whole; what each command does |
-//! | `receiver` | sequence numbers and acknowledgements |
+//! | `receiver` | sequence numbers, checks and acknowledgements |
 //! | `motion_clock`, `hold`, `motion_commands` | the clock that steps are due on; when it slows down and stops |
 //! | `heater`, `heater_commands` | temperature loops on the board, and what a silent host means to them |
 //! | `scheduler`, `moves` | timers; the pool of queued moves |

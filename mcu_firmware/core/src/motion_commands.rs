@@ -76,15 +76,16 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             return Err(ShutdownReason::MotionNotHeld);
         }
         self.hold.forget_lease();
-        let Self { objects, timers, moves, receiver, hold, job, .. } = self;
+        let Self { objects, timers, moves, receiver, hold, job, reports_pending, .. } = self;
         for (oid, object) in objects.iter_mut() {
             match object {
                 Object::Stepper(stepper) => {
                     if stepper.drop_queue(moves) {
                         timers.cancel(oid);
                     }
-                    // One that finds no room can be asked for: nothing of it changes until the clock is reset.
-                    let _ = receiver.send(board, &stepper.progress(oid, *job));
+                    // One that finds no room waits for it: nothing of it changes until the clock is reset.
+                    stepper.report_pending = !receiver.send(board, &stepper.progress(oid, *job));
+                    *reports_pending |= stepper.report_pending;
                 }
                 Object::DigitalOut(output) if output.is_tied() => {
                     output.drop_queue(moves);

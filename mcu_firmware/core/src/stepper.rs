@@ -67,6 +67,8 @@ pub(crate) struct Stepper {
     rows: Rows,
     /// The trigger that stops it.
     pub(crate) stop_on: Option<u8>,
+    /// How far it came is still to be told.
+    pub(crate) report_pending: bool,
 }
 
 impl Stepper {
@@ -97,6 +99,7 @@ impl Stepper {
             dropped: (0, false),
             rows: Rows::NONE,
             stop_on: None,
+            report_pending: false,
         })
     }
 
@@ -356,6 +359,7 @@ impl Stepper {
         self.left = 0;
         self.stopped = true;
         self.stop_on = None;
+        self.report_pending = false;
     }
 
     const fn is_active(&self) -> bool {

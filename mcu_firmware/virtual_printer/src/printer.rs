@@ -108,7 +108,7 @@ impl<R: Recorder> VirtualPrinter<R> {
 
     fn check_target(&self, kind: &FailureKind) -> Result<(), WiringError> {
         let (name, known) = match kind {
-            FailureKind::Unplug | FailureKind::Replug => return Ok(()),
+            FailureKind::Unplug | FailureKind::Replug | FailureKind::BoardReset => return Ok(()),
             FailureKind::SensorOpen(name)
             | FailureKind::SensorShort(name)
             | FailureKind::HeaterDead(name)
@@ -315,6 +315,7 @@ impl<R: Recorder> VirtualPrinter<R> {
                 self.board.up.clear();
             }
             FailureKind::Replug => self.board.plugged = true,
+            FailureKind::BoardReset => self.board.restart_wanted = true,
             FailureKind::SensorOpen(name) | FailureKind::SensorShort(name) => {
                 let reads = if matches!(kind, FailureKind::SensorOpen(_)) { ADC_MAX } else { 0 };
                 if let Some(index) = heater(name) {
@@ -379,6 +380,7 @@ impl<R: Recorder> VirtualPrinter<R> {
 fn new_firmware(profile: &BoardProfile) -> Box<Firmware<OBJECTS_MAX, MOVES_MAX>> {
     let firmware = Firmware::new(profile.clock).with_move_count(profile.move_count);
     let firmware = if profile.motion_clock { firmware } else { firmware.without_motion_clock() };
+    let firmware = if profile.block_check { firmware } else { firmware.without_block_check() };
     Box::new(if profile.board_heaters { firmware } else { firmware.without_heaters() })
 }
 

@@ -30,10 +30,12 @@ pub struct BoardProfile {
     pub clock_at_start: Ticks,
     /// What a restart of the firmware takes; a USB board is gone from the bus in the meantime.
     pub restart: Seconds,
-    /// Whether the firmware has our motion clock. Without it the board is as one with plain Klipper firmware.
+    /// Whether the firmware has our motion clock.
     pub motion_clock: bool,
     /// Whether the firmware regulates heaters.
     pub board_heaters: bool,
+    /// Whether the firmware knows the block check. Without all three the board is as one with plain Klipper firmware.
+    pub block_check: bool,
 }
 
 /// Most moves that any board's queue holds.
@@ -71,10 +73,10 @@ impl BoardProfile {
         Some(if is_plain { profile.plain() } else { profile })
     }
 
-    /// The same board with plain Klipper firmware: without a motion clock and without heaters of its own.
+    /// The same board with plain Klipper firmware: without our extensions.
     #[must_use]
     pub fn plain(self) -> Self {
-        Self { motion_clock: false, board_heaters: false, ..self }
+        Self { motion_clock: false, board_heaters: false, block_check: false, ..self }
     }
 
     /// Every board.
@@ -97,6 +99,7 @@ impl BoardProfile {
             restart: Seconds(0.5),
             motion_clock: true,
             board_heaters: true,
+            block_check: true,
         }
     }
 
@@ -115,6 +118,7 @@ impl BoardProfile {
             restart: Seconds(0.1),
             motion_clock: true,
             board_heaters: true,
+            block_check: true,
         }
     }
 
@@ -154,6 +158,7 @@ impl BoardProfile {
             pins: self.pins.iter().map(|&(name, first, count)| (name.to_owned(), first, count)).collect(),
             motion_clock: self.motion_clock,
             board_heaters: self.board_heaters,
+            block_check: self.block_check,
         }
     }
 }

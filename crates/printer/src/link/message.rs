@@ -3,7 +3,7 @@
 use units::Ticks;
 use wire::{
     Command,
-    block::PAYLOAD_BYTES_MAX,
+    check::MESSAGE_BYTES_MAX,
     dictionary::{Dictionary, DictionaryError},
     vlq::SliceSink,
 };
@@ -28,7 +28,7 @@ pub enum Lane {
 /// A message to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outgoing {
-    pub(super) bytes: [u8; PAYLOAD_BYTES_MAX],
+    pub(super) bytes: [u8; MESSAGE_BYTES_MAX],
     pub(super) len: u8,
     pub(super) lane: Lane,
     /// The clock by which the board must have it.
@@ -42,9 +42,9 @@ pub struct Outgoing {
 }
 
 impl Outgoing {
-    /// A message of these bytes; `None` where they do not fit a block.
+    /// A message of these bytes; `None` where they do not fit a block beside its check.
     pub fn from_bytes(lane: Lane, payload: &[u8]) -> Option<Self> {
-        let mut bytes = [0; PAYLOAD_BYTES_MAX];
+        let mut bytes = [0; MESSAGE_BYTES_MAX];
         bytes.get_mut(..payload.len())?.copy_from_slice(payload);
         Some(Self::new(lane, bytes, payload.len()))
     }
@@ -55,16 +55,16 @@ impl Outgoing {
         dictionary: &Dictionary,
         command: &Command<'_>,
     ) -> Result<Self, DictionaryError> {
-        let mut bytes = [0; PAYLOAD_BYTES_MAX];
+        let mut bytes = [0; MESSAGE_BYTES_MAX];
         let mut sink = SliceSink::new(&mut bytes);
         dictionary.encode(command, &mut sink)?;
         let len = sink.len();
         // The longest command has eight integers; only responses carry strings.
-        debug_assert!(len < PAYLOAD_BYTES_MAX, "every command fits a block");
+        debug_assert!(len < MESSAGE_BYTES_MAX, "every command fits a block beside its check");
         Ok(Self::new(lane, bytes, len))
     }
 
-    const fn new(lane: Lane, bytes: [u8; PAYLOAD_BYTES_MAX], len: usize) -> Self {
+    const fn new(lane: Lane, bytes: [u8; MESSAGE_BYTES_MAX], len: usize) -> Self {
         Self {
             bytes,
             len: len as u8,

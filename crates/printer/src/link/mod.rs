@@ -13,12 +13,17 @@ mod rtt;
 mod window;
 
 #[cfg(test)]
+mod check_tests;
+#[cfg(test)]
 mod lossy_line;
 #[cfg(test)]
 mod tests;
 
 use units::{Hertz, Seconds, Ticks};
-use wire::block::{BLOCK_BYTES_MAX, BLOCK_BYTES_MIN, Deframer, Frame};
+use wire::{
+    block::{BLOCK_BYTES_MAX, Deframer, Frame},
+    dictionary::BlockChecks,
+};
 
 pub use self::{
     clocks::Clocks,
@@ -85,6 +90,10 @@ pub struct LinkStats {
     pub garbage: u64,
     /// Valid blocks with a number that the board cannot expect.
     pub absurd: u64,
+    /// Blocks that the framing took for valid and the block check did not.
+    pub unchecked: u64,
+    /// Whether the board sends none without that check.
+    pub checked: bool,
     /// The smoothed round-trip time.
     pub round_trip: Option<Seconds>,
     /// When the last valid block arrived.
@@ -107,6 +116,9 @@ struct Held {
 pub struct Link {
     deframer: Deframer,
     window: Window,
+    checks: Option<BlockChecks>,
+    /// The board has sent a block with a valid check: from then on it sends none without.
+    is_checked: bool,
     lanes: Lanes,
     moves: MoveQueue,
     receive_window: usize,
@@ -122,12 +134,20 @@ impl Default for Link {
 }
 
 impl Link {
-    /// A link that knows nothing of the board yet: it asks for the board's sequence number before it sends anything
-    /// else. Motion waits until [`set_board`](Self::set_board).
+    /// A link that knows nothing of the board yet: it asks for the board's sequence number with empty blocks before it
+    /// sends anything else. Motion waits until [`set_board`](Self::set_board).
     pub fn new() -> Self {
+        Self::greeting(&[])
+    }
+
+    /// The same, with these messages in the blocks that ask for the number. The board may take them any number of times,
+    /// and in this order before all others.
+    pub fn greeting(payload: &[u8]) -> Self {
         Self {
             deframer: Deframer::new(),
-            window: Window::new(),
+            window: Window::new(payload.to_vec()),
+            checks: None,
+            is_checked: false,
             lanes: Lanes::default(),
             moves: MoveQueue::new(0, Ticks(0)),
             receive_window: usize::MAX,
@@ -140,6 +160,13 @@ impl Link {
     /// The most unacknowledged bytes that the board has room for (`RECEIVE_WINDOW` in its dictionary).
     pub fn set_receive_window(&mut self, bytes: usize) {
         self.receive_window = bytes.max(BLOCK_BYTES_MAX);
+    }
+
+    /// The board knows the block check: from now on blocks carry it, and from the board's first one that does on, those
+    /// that do not are dropped.
+    pub fn set_checks(&mut self, checks: BlockChecks) {
+        self.window.set_check(checks.to_board);
+        self.checks = Some(checks);
     }
 
     /// The board's nominal clock and the size of its move queue. Forgets what was in that queue.
@@ -156,13 +183,28 @@ impl Link {
 
     /// Takes bytes from the port and hands on the messages in them, block by block.
     pub fn receive(&mut self, bytes: &[u8], now: Seconds, mut each: impl FnMut(Payload<'_>)) {
-        let Self { deframer, window, stats, .. } = self;
+        let Self { deframer, window, checks, is_checked, stats, .. } = self;
         stats.bytes_received += bytes.len() as u64;
         deframer.push(bytes, |frame| {
-            let Frame::Block { sequence, payload } = frame else {
+            let Frame::Block { sequence, mut payload } = frame else {
                 stats.garbage += 1;
                 return;
             };
+            if let Some(checks) = checks {
+                match checks.from_board.open(sequence, payload) {
+                    Some(messages) => (payload, *is_checked) = (messages, true),
+                    // A board that has just started checks no more, and its numbers mean nothing.
+                    None if *is_checked && payload == checks.starting => {
+                        each(Payload { bytes: payload, received: now, sent: None });
+                        return;
+                    }
+                    None if *is_checked => {
+                        stats.unchecked += 1;
+                        return;
+                    }
+                    None => {}
+                }
+            }
             stats.blocks_received += 1;
             stats.last_received = Some(now);
             let verdict = window.answer(sequence, payload.is_empty(), now.0);
@@ -210,6 +252,11 @@ impl Link {
         self.window.uncovered().into_iter().chain(self.lanes.uncovered()).min()
     }
 
+    /// The earliest clock at which any motion is due that has not been sent.
+    pub fn motion_waiting(&self) -> Option<Ticks> {
+        self.lanes.uncovered()
+    }
+
     /// The clock of the last step of a motion lane that the board has acknowledged; zero before the first.
     pub fn motion_acknowledged(&self, lane: u8) -> Ticks {
         self.window.motion_ends().get(usize::from(lane)).copied().unwrap_or_default()
@@ -240,7 +287,8 @@ impl Link {
 
     /// Counts.
     pub fn stats(&self) -> LinkStats {
-        LinkStats { round_trip: self.window.round_trip.smoothed_s().map(Seconds), ..self.stats }
+        let round_trip = self.window.round_trip.smoothed_s().map(Seconds);
+        LinkStats { round_trip, checked: self.is_checked, ..self.stats }
     }
 
     /// Appends what is to be sent now, and says when to call again if nothing arrives before. `clocks` are the
@@ -303,7 +351,7 @@ impl Link {
 
     /// The most message bytes for the next block, and whether only the immediate lane may send.
     fn room_on_the_line(&self) -> Option<(usize, bool)> {
-        let payload_bytes = self.window.loss.payload_bytes();
+        let payload_bytes = self.window.payload_bytes();
         let blocks = self.window.blocks();
         if blocks < self.window.loss.window_blocks() && self.has_room_for(payload_bytes) {
             Some((payload_bytes, false))
@@ -317,7 +365,7 @@ impl Link {
     /// Whether the board has room for a block with so many message bytes.
     fn has_room_for(&self, payload_bytes: usize) -> bool {
         let room = self.receive_window.saturating_sub(self.window.bytes());
-        self.window.blocks() == 0 || BLOCK_BYTES_MIN + payload_bytes <= room
+        self.window.blocks() == 0 || self.window.overhead_bytes() + payload_bytes <= room
     }
 
     /// How long before it is due motion is sent even in a block that is not full.

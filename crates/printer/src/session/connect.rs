@@ -19,7 +19,7 @@ use crate::{
     clock_sync::{ClockRequest, ClockSync},
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
-    identify::{Identify, IdentifyError},
+    identify::{Identify, IdentifyError, PIECE_BYTES},
     journal::BoardQueue,
     link::{Lane, Link, Outgoing},
 };
@@ -83,9 +83,15 @@ impl Heard {
 impl Identifying {
     /// A board on a port that has just been opened.
     pub(super) fn new(now: Seconds) -> Self {
+        let bootstrap = Dictionary::bootstrap();
+        // The first question of all, asked until the board's number is known: a board that checks blocks for a host before
+        // us takes this one without a check, and asks for none from then on.
+        let question = Command::Identify { offset: 0, count: PIECE_BYTES };
+        let greeting = Outgoing::command(Lane::Control, &bootstrap, &question);
+        let link = greeting.map_or_else(|_| Link::new(), |greeting| Link::greeting(greeting.payload()));
         Self {
-            link: Link::new(),
-            bootstrap: Dictionary::bootstrap(),
+            link,
+            bootstrap,
             identify: Identify::new(),
             not_before: now,
             has_begun: true,
@@ -225,6 +231,9 @@ impl Connecting {
         };
         if let Some(window) = window {
             board.link.set_receive_window(window as usize);
+        }
+        if let Some(checks) = board.dictionary.block_checks() {
+            board.link.set_checks(checks);
         }
         let asking = Asking::default();
         Ok((Self { board, step: Step::State, asked: None, began: None, config: None, asking }, event))

@@ -90,6 +90,8 @@ fn message(response: &Response<'_>) -> Option<Message> {
         Response::HeaterState { oid, target, power, state, .. } => {
             Message::Heater(HeaterReport::new(oid, target, power, state))
         }
-        Response::Stats { .. } | Response::IdentifyResponse { .. } => return None,
+        Response::Stats { .. } | Response::IdentifyResponse { .. } | Response::BlockChecked { .. } => {
+            return None;
+        }
     })
 }

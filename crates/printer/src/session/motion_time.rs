@@ -94,7 +94,8 @@ impl Default for MotionTime {
 }
 
 impl MotionTime {
-    /// The motion clock at a hardware clock; never beyond what it can be.
+    /// The motion clock at a hardware clock; never beyond what it can be. While it slows, no more is claimed than was told:
+    /// what it was told to run at, it runs at no longer.
     pub(super) fn at(&self, clock: Ticks) -> Ticks {
         if self.in_doubt {
             return self.motion;
@@ -102,6 +103,7 @@ impl MotionTime {
         let since = clock.0 as i64 - self.clock.0 as i64;
         let made = match (self.state, self.rate) {
             (MotionState::Running, RATE_ONE) => since,
+            (MotionState::Slowing, _) => 0,
             (_, rate) => since.max(0) / i64::from(RATE_ONE) * i64::from(rate.min(RATE_ONE)),
         };
         Ticks(self.motion.0.saturating_add_signed(made))

@@ -359,13 +359,12 @@ impl Bench {
         &self.printer.recorder().0
     }
 
-    /// Pulses from the first one, with times from there.
+    /// Pulses from the first one, with times from there. Those of one tick, of different motors, have no order.
     pub(crate) fn relative_pulses(&self, from: usize) -> Vec<Pulse> {
         let pulses = &self.pulses()[from..];
         let first = pulses.first().map_or(0, |pulse| pulse.0);
         let mut pulses: Vec<Pulse> =
             pulses.iter().map(|&(at, motor, forward)| (at - first, motor, forward)).collect();
-        // Which of two that are due together comes first, nobody promises.
         pulses.sort_unstable();
         pulses
     }

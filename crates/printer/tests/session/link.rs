@@ -107,6 +107,39 @@ fn a_cable_that_is_pulled() {
 }
 
 #[test]
+fn blocks_are_checked_where_the_board_knows_how() {
+    for board in BoardProfile::all() {
+        for (board, checked) in [(board.clone(), true), (board.plain(), false)] {
+            let setup = Setup { board, ..Setup::default() };
+            let mut bench = setup.ready();
+            assert_eq!(bench.session.link_stats().unwrap().checked, checked);
+            // A host that died leaves a board that takes nothing without a check; the next one finds in all the same.
+            bench.gcode("M104 S200");
+            bench.replace_session(&setup.config);
+            bench.connect();
+            let stats = bench.session.link_stats().unwrap();
+            assert_eq!((stats.checked, stats.unchecked), (checked, 0));
+            bench.home();
+        }
+    }
+}
+
+#[test]
+fn a_board_that_starts_anew_in_a_print_is_noticed_and_left_alone() {
+    for board in BoardProfile::all().into_iter().flat_map(|board| [board.clone().plain(), board]) {
+        let setup = Setup { board, ..Setup::faults("board-reset@45") };
+        let mut bench = setup.ready();
+        let body: String = (0..60).map(|_| "G1 X100 E2 F1200\nG1 X10 E2\n").collect();
+        bench.start(&format!("{START}{body}{END}"));
+        bench.until("the restart", 80.0, |bench| bench.session.phase() == PhaseName::Failed);
+        assert!(bench.age() < 46.0, "{}", bench.age());
+        bench.failed(ErrorCode::BoardRestarted, None);
+        bench.run(10.0);
+        bench.assert_all_off();
+    }
+}
+
+#[test]
 fn a_board_that_another_host_left_configured() {
     let mut bench = Setup::default().ready();
     bench.home();

@@ -4,7 +4,7 @@ use alloc::{borrow::ToOwned, collections::BTreeMap, string::String, vec::Vec};
 
 use super::{Constant, EnumerationValue, Json, format_of};
 use crate::{
-    messages::{CommandKind, MessageSpec, ResponseKind},
+    messages::{CommandKind, Extension, MessageSpec, ResponseKind},
     shutdown::ShutdownReason,
 };
 
@@ -23,6 +23,8 @@ pub struct Description {
     pub motion_clock: bool,
     /// Whether the board regulates heaters: the messages for that, and the constant [`BOARD_HEATERS`].
     pub board_heaters: bool,
+    /// Whether the board knows the block check: its messages, and the constant [`BLOCK_CHECK`].
+    pub block_check: bool,
 }
 
 /// The constant by which a board says that it has a motion clock: the extension's version.
@@ -33,8 +35,21 @@ const MOTION_CLOCK_VERSION: f64 = 1.0;
 pub const BOARD_HEATERS: &str = "BOARD_HEATERS";
 /// The version that is described in docs/board-heaters.md.
 const BOARD_HEATERS_VERSION: f64 = 1.0;
+/// The constant by which a board says that it knows the block check: the extension's version.
+pub const BLOCK_CHECK: &str = "BLOCK_CHECK";
+/// The version that is described in docs/block-check.md.
+pub const BLOCK_CHECK_VERSION: f64 = 1.0;
 
 impl Description {
+    const fn has(&self, extension: Option<Extension>) -> bool {
+        match extension {
+            None => true,
+            Some(Extension::MotionClock) => self.motion_clock,
+            Some(Extension::Heaters) => self.board_heaters,
+            Some(Extension::BlockCheck) => self.block_check,
+        }
+    }
+
     /// The dictionary as JSON.
     pub fn json(&self) -> String {
         let formats = |specs: &mut dyn Iterator<Item = MessageSpec>| -> BTreeMap<String, i32> {
@@ -50,17 +65,15 @@ impl Description {
         let reasons = ShutdownReason::ALL
             .iter()
             .map(|&reason| (reason.text().to_owned(), EnumerationValue::One(i64::from(reason as u16))));
-        let extensions = [
-            (self.motion_clock, MOTION_CLOCK, MOTION_CLOCK_VERSION),
-            (self.board_heaters, BOARD_HEATERS, BOARD_HEATERS_VERSION),
+        let versions = [
+            (Extension::MotionClock, MOTION_CLOCK, MOTION_CLOCK_VERSION),
+            (Extension::Heaters, BOARD_HEATERS, BOARD_HEATERS_VERSION),
+            (Extension::BlockCheck, BLOCK_CHECK, BLOCK_CHECK_VERSION),
         ];
-        let extensions = extensions.into_iter().filter(|&(has, ..)| has);
-        let extensions = extensions.map(|(_, name, version)| (name.to_owned(), Constant::Number(version)));
-        let has = |is_extension: bool, is_heater: bool| match (is_extension, is_heater) {
-            (_, true) => self.board_heaters,
-            (true, false) => self.motion_clock,
-            (false, false) => true,
-        };
+        let extensions = versions
+            .into_iter()
+            .filter(|&(extension, ..)| self.has(Some(extension)))
+            .map(|(_, name, version)| (name.to_owned(), Constant::Number(version)));
         let json = Json {
             version: self.version.clone(),
             build_versions: self.build_versions.clone(),
@@ -68,13 +81,13 @@ impl Description {
             commands: formats(
                 &mut CommandKind::ALL
                     .iter()
-                    .filter(|kind| has(kind.is_extension(), kind.is_heater()))
+                    .filter(|kind| self.has(kind.extension()))
                     .map(|kind| kind.spec()),
             ),
             responses: formats(
                 &mut ResponseKind::ALL
                     .iter()
-                    .filter(|kind| has(kind.is_extension(), kind.is_heater()))
+                    .filter(|kind| self.has(kind.extension()))
                     .map(|kind| kind.spec()),
             ),
             output: BTreeMap::new(),

@@ -121,7 +121,7 @@ impl Bench {
     /// The same with plain Klipper firmware.
     pub(crate) fn plain(now: u64) -> Self {
         let mut bench = Self::at(now);
-        *bench.firmware = Firmware::new(CLOCK).without_motion_clock().without_heaters();
+        *bench.firmware = Firmware::new(CLOCK).plain();
         bench
     }
 
@@ -135,11 +135,22 @@ impl Bench {
         bench
     }
 
-    /// Sends a block with the next number and returns whether it was acknowledged.
-    pub(crate) fn send_payload(&mut self, payload: &[u8]) {
-        self.firmware.receive(&mut self.board, Block::new(self.sequence, payload).as_bytes());
-        self.sequence = self.sequence.wrapping_add(1);
+    /// Hands the board bytes as they are.
+    pub(crate) fn receive(&mut self, bytes: &[u8]) {
+        self.firmware.receive(&mut self.board, bytes);
         self.firmware.run_timers(&mut self.board);
+    }
+
+    /// Sends a block with the next number.
+    pub(crate) fn send_payload(&mut self, payload: &[u8]) {
+        self.receive(Block::new(self.sequence, payload).as_bytes());
+        self.sequence = self.sequence.wrapping_add(1);
+    }
+
+    /// Sends commands, a block each, from this number on.
+    pub(crate) fn send_from(&mut self, sequence: u8, commands: &[Command<'_>]) {
+        self.sequence = sequence;
+        self.send_all(commands);
     }
 
     pub(crate) fn send(&mut self, command: &Command<'_>) {

@@ -1,6 +1,7 @@
 //! What a host and an oscilloscope see of the firmware core: every test speaks blocks and looks at pins.
 
 mod bench;
+mod block_check;
 mod faults;
 mod heaters;
 mod hold;

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use wire::{Command, Response, RowCheck, ShutdownReason};
 
 use crate::{
-    bench::{Bench, SECOND, output, steps},
+    bench::{Bench, SECOND, output, stepper, steps},
     hold::{Seen, motion_bench, motion_state, watch_until},
 };
 
@@ -199,4 +199,24 @@ fn an_output_that_must_be_refreshed_cannot_be_tied() {
         Command::MotionTie { oid: OUTPUT },
     ]);
     assert_eq!(bench.shutdown(), Some(ShutdownReason::InvalidMotion));
+}
+
+#[test]
+fn what_a_drop_has_to_tell_waits_for_room() {
+    let mut bench = Bench::configured(0, &[stepper(0), stepper(1)]);
+    bench.send_all(&[Command::MotionJob { id: 5 }, Command::MotionHold { ramp: RAMP }]);
+    bench.run_for(2 * SECOND);
+    bench.board.sent.clear();
+    bench.board.has_room = false;
+    bench.send(&Command::MotionDrop {});
+    bench.run_for(SECOND);
+    assert!(bench.firmware.has_tasks());
+    bench.board.has_room = true;
+    bench.run_for(SECOND);
+    let told = bench.pick(|response| match *response {
+        Response::StepperQueue { oid, job, .. } => Some((oid, job)),
+        _ => None,
+    });
+    assert_eq!(told, [(0, 5), (1, 5)]);
+    assert!(!bench.firmware.has_tasks());
 }

@@ -43,6 +43,8 @@ const PUMP_INTERVAL: Seconds = Seconds(0.05);
 const SKIP_INTERVAL: Seconds = Seconds(0.002);
 /// How often a machine at rest looks after itself.
 const IDLE_INTERVAL: Seconds = Seconds(0.25);
+/// Motion that is due this long ago and has not been sent is none that the board could make.
+const LATE_MAX: Seconds = Seconds(1.0);
 
 /// What a failure leads to.
 #[derive(Debug)]
@@ -230,6 +232,7 @@ impl Ready {
         if !self.lease.is_in_doubt(&mut self.board, now) {
             self.go_on(now)?;
         }
+        self.check_late(now)?;
         let link_wake = self.board.link.poll(now, self.board.clocks(now), out);
         let busy = self.stream.run().is_some() || !matches!(self.wait, Wait::Nothing);
         let own_wake = now
@@ -240,6 +243,14 @@ impl Ready {
             };
         let wake = own_wake.min(self.board.sync.next_wake());
         Ok(link_wake.map_or(wake, |link| link.min(wake)))
+    }
+
+    /// Steps that were due long ago must not be sent: beyond half of its clock's range a board takes what is past for what
+    /// is to come.
+    fn check_late(&self, now: Seconds) -> Result<(), Failure> {
+        let due = self.board.link.motion_waiting();
+        let late = due.is_some_and(|due| due + self.board.ticks(LATE_MAX) < self.board.motion_at(now));
+        if late { Err(Failure::Stop(ErrorCode::OrdersTooLate.into())) } else { Ok(()) }
     }
 
     /// Does what is due by the motion clock, and what follows from it.
