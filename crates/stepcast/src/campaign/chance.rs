@@ -30,7 +30,7 @@ impl Chance {
 
     /// Spread so that each order of magnitude of a range is as likely as the others.
     pub(super) fn magnitude(&mut self, range: Range<f64>) -> f64 {
-        self.between(range.start.ln()..range.end.ln()).exp()
+        libm::exp(self.between(libm::log(range.start)..libm::log(range.end)))
     }
 
     /// A number below `end`, which is not 0.

@@ -54,14 +54,12 @@ pub(super) fn judge(case: &Case, clean: &Print, print: &Print, standby: Seconds)
     let judging = Judging { case, clean, print, clock: case.board.clock };
     match case.promise {
         Promise::SamePulses => judging.same(true, &mut finding),
-        Promise::SameSteps => judging.same(false, &mut finding),
         Promise::SameStepsOrRefused if is_refused(print) => {}
-        Promise::SameStepsOrRefused => judging.same(false, &mut finding),
+        Promise::SameSteps | Promise::SameStepsOrRefused => judging.same(false, &mut finding),
         Promise::AtRest => judging.at_rest(standby, &mut finding),
-        Promise::Fails => judging.fails(standby, &mut finding),
         Promise::Shutdown => judging.shuts_down(standby, &mut finding),
         Promise::SameOrFails if print.report.result == Outcome::Done => judging.same(true, &mut finding),
-        Promise::SameOrFails => judging.fails(standby, &mut finding),
+        Promise::Fails | Promise::SameOrFails => judging.fails(standby, &mut finding),
     }
     if finding.restarts_without_consent > 0 {
         finding.broken.push("motion began again without the user's word".to_owned());

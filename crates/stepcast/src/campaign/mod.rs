@@ -32,7 +32,7 @@ use virtual_printer::BoardProfile;
 pub(crate) use self::scenario::Scenario;
 use self::{
     chance::Chance,
-    judge::{Finding, Print, judge},
+    judge::{Print, judge},
     report::{Broken, Class},
     scenario::{Case, Times},
     window::{Source, Window},
@@ -121,12 +121,11 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 
 impl Campaign {
     fn new(args: &CampaignArgs) -> anyhow::Result<Self> {
-        let mut config = match &args.config {
-            Some(path) => config_file::load(path)?,
-            None => {
-                let (config, _) = printer::config::parse(demo_machine::USUAL_MACHINE);
-                config.context("the usual machine's file is damaged")?
-            }
+        let mut config = if let Some(path) = &args.config {
+            config_file::load(path)?
+        } else {
+            let (config, _) = printer::config::parse(demo_machine::USUAL_MACHINE);
+            config.context("the usual machine's file is damaged")?
         };
         config.printer.standby_time = STANDBY;
         let mut sources = Vec::new();
@@ -182,27 +181,17 @@ impl Campaign {
                 fs::write(&path, &window.gcode)
                     .with_context(|| format!("cannot write {}", path.display()))?;
             }
-            self.add(scenario, &finding, classes, |what| Broken {
-                seed,
-                board: board_name(&case.board),
-                window: window.name.clone(),
-                faults: faults_text(&case),
-                what,
-            });
+            if let Some(class) = lock(classes).get_mut(&scenario) {
+                class.add(&finding, |what| Broken {
+                    seed,
+                    board: board_name(&case.board),
+                    window: window.name.clone(),
+                    faults: faults_text(&case),
+                    what,
+                });
+            }
         }
         Ok(())
-    }
-
-    fn add(
-        &self,
-        scenario: Scenario,
-        finding: &Finding,
-        classes: &Mutex<BTreeMap<Scenario, Class>>,
-        about: impl FnOnce(Vec<String>) -> Broken,
-    ) {
-        if let Some(class) = lock(classes).get_mut(&scenario) {
-            class.add(finding, about);
-        }
     }
 
     /// The print without a fault, which has to be sound for anything to be learned from it.

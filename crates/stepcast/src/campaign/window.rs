@@ -193,7 +193,7 @@ pub(super) fn fast(chance: &mut Chance) -> Window {
             let way = [sign * reach, if straight { 0.0 } else { chance.between(-reach..reach) }];
             let next = [0, 1].map(|axis: usize| (place[axis] + way[axis]).clamp(low, high));
             let _ = writeln!(text, "G1 X{:.3} Y{:.3} F{:.0}", next[0], next[1], 60.0 * speed);
-            took_s += (next[0] - place[0]).hypot(next[1] - place[1]) / speed + 0.02;
+            took_s += libm::hypot(next[0] - place[0], next[1] - place[1]) / speed + 0.02;
             place = next;
         }
     }

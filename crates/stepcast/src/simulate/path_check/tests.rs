@@ -187,7 +187,9 @@ fn a_homing_move_that_its_trigger_cuts_short_hides_nothing_behind_it() {
     let next = span(3, 60_000, 90_000, [STEP_MM, 0.0], [0.0, 0.0]);
     let announce = || {
         let mut check = check();
-        [homing, line, next].iter().for_each(|span| check.expect(span).unwrap());
+        for span in [homing, line, next] {
+            check.expect(&span).unwrap();
+        }
         check
     };
     let mut good = announce();
