@@ -60,8 +60,8 @@ export function strolling(seconds: number, isCold = false): string {
 }
 
 /** The same with a layer every few sides: moves of Z, the fan, and a wait, so that there are several runs of motion. */
-export function climbing(seconds: number): string {
-  const lines = strolling(seconds, true).split('\n');
+export function climbing(seconds: number, isCold = true): string {
+  const lines = strolling(seconds, isCold).split('\n');
   const at = lines.findIndex((line) => line.startsWith('G1 X50')) + 1;
   const sides = lines.slice(at, -3);
   const layers = sides.flatMap((line, side) => {

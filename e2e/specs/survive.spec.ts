@@ -129,6 +129,27 @@ test('the renderer is killed: another page takes the print up and goes on', asyn
   await goOn({ printer, panel: again });
 });
 
+test('a hot print: the board lowers its heat while it is alone, and gets it back before the next step', async ({
+  bridge,
+  open,
+  watch,
+}) => {
+  test.setTimeout(180_000);
+  watch.expectError(/the page crashed/);
+  const gcode = climbing(60, false);
+  const { printer, panel } = await printing({ bridge, open }, gcode);
+  await crash(panel.page);
+  await atRest(printer);
+  const nozzle = (): number => printer.state().heaters[0]?.temperature_c ?? Number.NaN;
+  const before = nozzle();
+  await expect.poll(nozzle, { timeout: 60_000 }).toBeLessThan(before - 20);
+  const again = await open();
+  await again.connectOffered();
+  await expect(held(again.page)).toContainText('Nozzle');
+  measured(`nozzle ${before.toFixed(0)} °C, when it is found ${nozzle().toFixed(0)} °C`);
+  await goOn({ printer, panel: again }, gcode);
+});
+
 test('a reload in the middle of the print: the same page takes it up again', async ({ bridge, open }) => {
   test.setTimeout(180_000);
   const { printer, panel } = await printing({ bridge, open });

@@ -59,10 +59,10 @@ function pick(): void {
   input.click();
 }
 
-/** How long ago, in words. */
-function ago(ms: number): string {
+/** How long it has been so, in words. */
+function since(ms: number): string {
   const seconds = Math.max(0, (Date.now() - ms) / 1000);
-  return seconds < 60 ? 'less than a minute ago' : `${formatDuration(seconds)} ago`;
+  return seconds < 60 ? 'less than a minute' : formatDuration(seconds);
 }
 
 function Known({ print }: { readonly print: KeptPrint }): JSX.Element {
@@ -78,7 +78,7 @@ function Known({ print }: { readonly print: KeptPrint }): JSX.Element {
         {facts.time !== null && ` of ${formatDuration(facts.time)}`}
       </Fact>
       <Fact name="Last heard of">{timeOf(heardOf)}</Fact>
-      <Fact name="Held since">{ago(heardOf)}</Fact>
+      <Fact name="Held for">{since(heardOf)}</Fact>
       {snapshot.value?.heaters.map(({ name, temperature, target }) => (
         <Fact key={name} name={HEATERS[name]}>
           {formatNumber(temperature, 1)} °C{target > 0 && ` of ${formatNumber(target)}`}
@@ -225,6 +225,7 @@ export function followHeld(): void {
       notify({
         kind: KIND,
         text: 'The board holds a print.',
+        isFixed: true,
         action: { text: 'Show', act: () => (isPutAway.value = false), why: null },
       });
     else withdraw(KIND);

@@ -4,7 +4,7 @@ import { type Notice, notices, withdraw } from '../state/notices';
 import { Button } from './parts';
 
 function Line({ notice }: { readonly notice: Notice }): JSX.Element {
-  const { kind, text, action, other, onClosed } = notice;
+  const { kind, text, action, other, isFixed, onClosed } = notice;
   return (
     <li class="notice">
       <span class="grow">{text}</span>
@@ -14,15 +14,17 @@ function Line({ notice }: { readonly notice: Notice }): JSX.Element {
         </Button>
       )}
       {other && <Button onClick={other.act}>{other.text}</Button>}
-      <Button
-        icon="close"
-        kind="quiet"
-        label="Put this notice away"
-        onClick={() => {
-          withdraw(kind);
-          onClosed?.();
-        }}
-      />
+      {!isFixed && (
+        <Button
+          icon="close"
+          kind="quiet"
+          label="Put this notice away"
+          onClick={() => {
+            withdraw(kind);
+            onClosed?.();
+          }}
+        />
+      )}
     </li>
   );
 }

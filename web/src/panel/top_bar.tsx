@@ -50,7 +50,10 @@ function end(): void {
   if (!isPrinting.value) return disconnect();
   ask({
     title: 'Disconnect while printing?',
-    text: 'That ends the print: the board stops when its queue of moves is empty and switches the heaters off.',
+    text:
+      port.value?.kind === 'virtual'
+        ? 'That ends the print: the virtual printer is gone with the connection.'
+        : 'A board with Stepcast\u2019s firmware brings the head to rest and holds the print until you connect again and resume or cancel it. Any other board stops when its queue of moves is empty and switches the heaters off: there the print is lost.',
     yes: 'Disconnect',
     no: 'Go on printing',
     act: disconnect,

@@ -8,6 +8,8 @@ export interface Notice {
   readonly action?: { readonly text: string; readonly act: () => void; readonly why: string | null };
   /** What else may be done. */
   readonly other?: { readonly text: string; readonly act: () => void };
+  /** It stays as long as what it says is so. */
+  readonly isFixed?: true;
   /** It was put away by the user. */
   readonly onClosed?: () => void;
 }
