@@ -116,6 +116,17 @@ test('what has come to its end is not kept, what was only left is', async () => 
   expect(await archive.list()).toEqual([]);
 });
 
+test('a record that cannot be read for now is not thrown away for that', async () => {
+  const log = await begun();
+  log.append('5 6');
+  const { readJournal } = store;
+  store.readJournal = () => Promise.reject(new DOMException('busy', 'UnknownError'));
+  await archive.settle(log, false);
+  expect(await archive.list()).toEqual([]);
+  store.readJournal = readJournal;
+  expect((await archive.list()).map(({ id }) => id)).toEqual([log.id]);
+});
+
 test('a record in which nothing was written, or whose print has ended, is put away with the list', async () => {
   const [empty, ended, odd] = [await begun(), await begun(), await begun()];
   ended.append('5 -1');

@@ -57,16 +57,17 @@ export interface Found {
 }
 
 const encoder = new TextEncoder();
-
 /** One print that cannot be read does not hide the others. */
-function ignored(error: unknown): [] {
-  if (error instanceof StorageError) return [];
-  throw error;
-}
+const nothing = (): [] => [];
 
-function troubleOf(error: unknown, word: typeof storageTrouble): Trouble {
-  if (!(error instanceof StorageError)) throw error;
-  return word(error.code, error.cause ?? error);
+/** Whatever was thrown: what cannot be kept must not stop a print. */
+const asStorageError = (error: unknown): StorageError =>
+  error instanceof StorageError ? error : new StorageError('broken', error);
+
+/** In words, for the user. */
+export function troubleOf(error: unknown): Trouble {
+  const { code, cause } = asStorageError(error);
+  return storageTrouble(code, cause ?? code);
 }
 
 /** A print that this tab alone writes. */
@@ -101,15 +102,14 @@ export class PrintLog {
     } catch (error) {
       this.#isOver = true;
       this.#open.close();
-      this.#tell(troubleOf(error, storageTrouble));
+      this.#tell(troubleOf(error));
     }
   }
 
   /** Copies the file alongside. */
   copy(file: Blob, hasRoom: Promise<boolean>): void {
     this.#copying = this.#copy(file, hasRoom).catch((error: unknown) => {
-      // A file that cannot be read to its end is told where it is printed.
-      if (!this.#isOver && error instanceof StorageError) this.#tell(copyMissing(error.code));
+      if (!this.#isOver) this.#tell(copyMissing(asStorageError(error).code));
     });
   }
 
@@ -160,7 +160,7 @@ export class Archive {
     } catch (error) {
       opened?.open.close();
       opened?.letGo();
-      tell(troubleOf(error, storageTrouble));
+      tell(troubleOf(error));
       return null;
     }
   }
@@ -191,12 +191,10 @@ export class Archive {
   }
 
   async #summary(id: string, held: number | null = null): Promise<JournalSummary | null> {
-    try {
-      return this.#read(await this.#store.readJournal(id), held);
-    } catch (error) {
-      if (error instanceof StorageError) return null;
-      throw error;
-    }
+    return await this.#store.readJournal(id).then(
+      (journal) => this.#read(journal, held),
+      () => null,
+    );
   }
 
   /** Has the file of a print copied beside it. */
@@ -207,8 +205,7 @@ export class Archive {
   /** A print is over for this page: what has come to its end is not kept. `isLost`: the board has nothing of it any more. */
   async settle(log: PrintLog, isLost: boolean): Promise<void> {
     await log.close();
-    const summary = isLost ? null : await this.#summary(log.id);
-    if (!summary || summary.hasEnded) await this.forget(log.id);
+    if (isLost || (await this.#summary(log.id))?.hasEnded) await this.forget(log.id);
   }
 
   /** Prints that were interrupted, the newest first. Those that have ended are put away. Empty where nothing can be read. */
@@ -221,10 +218,10 @@ export class Archive {
         const summary = await this.#summary(id);
         if (journalBytes === 0 || summary?.hasEnded) await this.forget(id);
         else if (summary)
-          found.push(...(await this.#kept(id, summary, changed).then((one) => [one], ignored)));
+          found.push(...(await this.#kept(id, summary, changed).then((one) => [one], nothing)));
       }
-    } catch (error) {
-      if (!(error instanceof StorageError)) throw error;
+    } catch {
+      // Where nothing can be read nothing is offered; a print that begins says so.
     }
     return found;
   }
@@ -235,12 +232,8 @@ export class Archive {
   }
 
   async #about(id: string): Promise<About> {
-    try {
-      // Written by this page's own code, whole or not at all.
-      return JSON.parse(new TextDecoder().decode(await this.#store.readAbout(id))) as About;
-    } catch (error) {
-      throw error instanceof StorageError ? error : new StorageError('broken', error);
-    }
+    // Written by this page's own code; one that was torn off cannot be parsed.
+    return JSON.parse(new TextDecoder().decode(await this.#store.readAbout(id))) as About;
   }
 
   /** The print whose journal knows the number under which the board holds one. Rejects where nothing can be read. */
@@ -259,9 +252,8 @@ export class Archive {
   async openFile({ id }: KeptPrint): Promise<Blob | null> {
     try {
       return await this.#store.openFile(id);
-    } catch (error) {
-      if (error instanceof StorageError) return null;
-      throw error;
+    } catch {
+      return null;
     }
   }
 
@@ -280,9 +272,8 @@ export class Archive {
   async forget(id: string): Promise<void> {
     try {
       await this.#store.remove(id);
-    } catch (error) {
+    } catch {
       // Another tab has it open, or nothing can be written: it is tried again with the next list.
-      if (!(error instanceof StorageError)) throw error;
     }
   }
 }

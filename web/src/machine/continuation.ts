@@ -3,11 +3,10 @@
 //
 // Knows neither ports nor how prints are stored.
 import { share } from '../units';
-import type { Archive, Found, PrintLog } from './archive';
+import { type Archive, type Found, type PrintLog, troubleOf } from './archive';
 import type { Machine } from './machine';
 import type { HeldPrint, KeptPrint, MachineEvent, Trouble } from './protocol';
-import { StorageError } from './storage';
-import { otherFile, storageTrouble } from './troubles';
+import { otherFile } from './troubles';
 
 const REFUSED = 'continuation-refused';
 
@@ -115,9 +114,7 @@ export class Continuation {
       if (file) await this.#begin(found, file, round, true);
       else this.#put({ kind: 'needs-file', print: found.print, trouble: null });
     } catch (error) {
-      if (!(error instanceof StorageError)) throw error;
-      if (round === this.#round)
-        this.#put({ kind: 'unknown', trouble: storageTrouble(error.code, error.cause ?? error) });
+      if (round === this.#round) this.#put({ kind: 'unknown', trouble: troubleOf(error) });
     }
   }
 
@@ -142,9 +139,7 @@ export class Continuation {
       await machine.logClosed();
       log = await archive.reopen(found, tellNotKept);
     } catch (error) {
-      if (!(error instanceof StorageError)) throw error;
-      const trouble = storageTrouble(error.code, error.cause ?? error);
-      if (round === this.#round) this.#put({ kind: 'refused', print, trouble });
+      if (round === this.#round) this.#put({ kind: 'refused', print, trouble: troubleOf(error) });
       return;
     }
     if (round !== this.#round) return await log.close();

@@ -13,6 +13,8 @@ export const PRINTS_MAX = 8;
 export const JOURNAL_BYTES_MAX = 256 * 1024 * 1024;
 /** So much stays free when a file is copied: the journal needs room, too. */
 const SPARE_BYTES = 32 * 1024 * 1024;
+/** So much of a copy is brought to the disk at once: the worker that drives the printer waits for it. */
+const FLUSH_BYTES = 4 * 1024 * 1024;
 const FOLDER = 'prints';
 const JOURNAL = 'journal';
 const FILE = 'file';
@@ -203,7 +205,7 @@ async function fill(
 ): Promise<string> {
   const reader = stream.getReader();
   const crc = new Crc32();
-  let bytes = 0;
+  let [bytes, flushed] = [0, 0];
   try {
     file?.truncate(0);
     for (;;) {
@@ -212,6 +214,10 @@ async function fill(
       if (file) writeAll(file, value, bytes);
       crc.add(value);
       bytes += value.byteLength;
+      if (bytes - flushed > FLUSH_BYTES) {
+        file?.flush();
+        flushed = bytes;
+      }
       progress(bytes);
     }
     file?.flush();

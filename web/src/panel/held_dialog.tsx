@@ -5,7 +5,7 @@ import type { JSX } from 'preact';
 import type { HeldPrint, KeptPrint, Trouble } from '../machine/protocol';
 import { timeOf } from '../state/interrupted';
 import { heldPrint } from '../state/kept';
-import { giveHeldFile, snapshot, wish } from '../state/machine';
+import { giveHeldFile, job, snapshot, wish } from '../state/machine';
 import { notify, withdraw } from '../state/notices';
 import { EmergencyStop } from './emergency';
 import { Fact } from './facts';
@@ -16,8 +16,10 @@ import { ask } from './question';
 
 /** The user wants to see something else first. */
 const isPutAway = signal(false);
-/** A choice was made, and is being carried out. */
+/** The user's word is on its way. */
 const isUnderWay = signal(false);
+/** It has been given: the print goes on, or heats before it does. */
+const isResumed = signal(false);
 const KIND = 'held-print';
 const HEATERS = { extruder: 'Nozzle', heater_bed: 'Bed' } as const;
 
@@ -44,7 +46,7 @@ function cancel(): void {
 async function resume(): Promise<void> {
   if (isUnderWay.value) return;
   isUnderWay.value = true;
-  await wish({ kind: 'resume' });
+  isResumed.value = await wish({ kind: 'resume' });
   isUnderWay.value = false;
 }
 
@@ -180,7 +182,7 @@ function Body({ held }: { readonly held: HeldPrint }): JSX.Element {
           </p>
           <Known print={held.print} />
           <div class="dialog-foot">
-            <Button kind="danger" class="big" onClick={cancel}>
+            <Button kind="danger" class="big" disabled={job.value !== 'held'} onClick={cancel}>
               Cancel
             </Button>
             <Button
@@ -188,6 +190,7 @@ function Body({ held }: { readonly held: HeldPrint }): JSX.Element {
               icon="play"
               class="big"
               busy={isUnderWay.value}
+              disabled={job.value !== 'held'}
               onClick={() => void resume()}
             >
               Resume
@@ -201,7 +204,7 @@ function Body({ held }: { readonly held: HeldPrint }): JSX.Element {
 /** Open as long as there is something to be decided, unless it is put away. */
 export function HeldDialog(): JSX.Element | null {
   const held = heldPrint.value;
-  if (!held || isPutAway.value) return null;
+  if (!held || isPutAway.value || isResumed.value) return null;
   return (
     <Dialog
       title="The board holds a print"
@@ -217,6 +220,17 @@ export function HeldDialog(): JSX.Element | null {
 
 /** Put away, a line in the page leads back. */
 export function followHeld(): void {
+  let hasGoneOn = false;
+  effect(() => {
+    const [held, state] = [heldPrint.value?.kind === 'held', job.value];
+    if (held && isResumed.value && (state !== 'held' || !hasGoneOn)) {
+      hasGoneOn ||= state !== 'held';
+      return;
+    }
+    // Held anew, or no longer at all.
+    hasGoneOn = false;
+    isResumed.value = false;
+  });
   effect(() => {
     if (heldPrint.value === null) {
       isPutAway.value = false;
