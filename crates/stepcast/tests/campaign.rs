@@ -4,7 +4,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-const SCENARIOS: [&str; 11] = [
+const SCENARIOS: [&str; 13] = [
     "corrupt",
     "flip",
     "drop",
@@ -12,6 +12,8 @@ const SCENARIOS: [&str; 11] = [
     "delay",
     "stall",
     "host_death",
+    "take_up",
+    "torn_journal",
     "board_reset",
     "sensor_fault",
     "plain_host_death",
@@ -46,6 +48,7 @@ fn every_promise_is_kept_whatever_happens() {
     }
     let death = &classes[6];
     assert!(death["time_to_rest_max_s"].as_f64().is_some_and(|rest| rest <= 0.36), "{death:#}");
+    assert_eq!(classes[7]["holds"], 2, "each is taken up");
     assert!(death["time_to_safe_heaters_max_s"].as_f64().is_some_and(|safe| safe <= 7.0), "{death:#}");
 }
 

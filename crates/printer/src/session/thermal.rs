@@ -168,9 +168,10 @@ impl Thermal {
         Ok(any)
     }
 
-    /// Whether every heater has reached its target.
+    /// Whether every heater has reached its target, by what was read since the last long pause.
     pub(super) fn is_heated(&self) -> bool {
-        self.channels.iter().all(|channel| channel.heater.is_heated())
+        let is_fresh = |channel: &Channel| channel.last_report.is_some_and(|at| at >= self.listening);
+        self.channels.iter().all(|channel| is_fresh(channel) && channel.heater.is_heated())
     }
 
     /// Everything off.
@@ -231,8 +232,11 @@ impl Thermal {
         let temperature = channel.thermistor.temperature(ratio);
         // When the readings were made, not when they arrived: a late report must not look like a slope.
         let read_at = board.sync.time_of(next_clock) - REPORT_INTERVAL;
-        // A reading from the future is a damaged one, and would make all that follow look old.
-        if read_at > now + REPORT_INTERVAL || channel.last_report.is_some_and(|last| read_at <= last) {
+        // A reading from the future is a damaged one, and would make all that follow look old. Those that have waited for
+        // this session in a long pause may be of any time: 32 bits of a clock do not say which.
+        let has_waited = now - self.listening < REPORT_INTERVAL || read_at < self.listening;
+        let is_elsewhen = has_waited || read_at > now + REPORT_INTERVAL;
+        if is_elsewhen || channel.last_report.is_some_and(|last| read_at <= last) {
             return None;
         }
         channel.last_report = Some(read_at);

@@ -148,7 +148,15 @@ impl Ready {
         self.planner.is_at_rest() && self.stream.run().is_none()
     }
 
+    /// What came during a long pause has waited: it tells nothing of now.
+    fn note_call(&mut self, now: Seconds) {
+        if self.calls.note(now) {
+            self.thermal.listens_again(now);
+        }
+    }
+
     pub(super) fn receive(&mut self, bytes: &[u8], now: Seconds) -> Result<(), Failure> {
+        self.note_call(now);
         // After a long pause nothing may be claimed of the motion clock, whose 32 bits say little then.
         self.lease.is_in_doubt(&mut self.board, now);
         for (message, sent) in inbox::receive(&mut self.board.link, &self.board.dictionary, bytes, now) {
@@ -222,9 +230,7 @@ impl Ready {
         if self.board.sync.is_silent(now) {
             return Err(Failure::Lost(ErrorCode::LinkLost.into()));
         }
-        if self.calls.note(now) {
-            self.thermal.listens_again(now);
-        }
+        self.note_call(now);
         self.thermal.check_silence(now).map_err(Failure::Stop)?;
         connect::ask_clock(&mut self.board, now);
         self.board.note_losses(now);
