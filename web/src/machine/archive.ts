@@ -212,8 +212,10 @@ export class Archive {
   async list(): Promise<readonly KeptPrint[]> {
     const found: KeptPrint[] = [];
     try {
+      const prints = await this.#store.listPrints();
+      // Asked after that: whoever begins a print has its lock first.
       const busy = await this.#locks.held();
-      for (const { id, changed, journalBytes } of await this.#store.listPrints()) {
+      for (const { id, changed, journalBytes } of prints) {
         if (busy.has(id)) continue;
         const summary = await this.#summary(id);
         if (journalBytes === 0 || summary?.hasEnded) await this.forget(id);
