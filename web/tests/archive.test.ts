@@ -192,6 +192,17 @@ test('without room for a copy the file is asked for again, and known again', asy
   expect(await archive.isItsFile(found.print, new Blob(['G28\nG1']))).toBe(false);
 });
 
+test('a file that does not come holds nothing up', async () => {
+  const log = await begun();
+  log.append('5 6');
+  const stuck = new Blob(['G28']);
+  Object.defineProperty(stuck, 'stream', { value: () => new ReadableStream() });
+  archive.copy(log, stuck);
+  await interrupted(log);
+  expect(locks.names.size).toBe(0);
+  expect(told).toEqual([]);
+});
+
 test('a copy that was broken off is none', async () => {
   const log = await begun();
   log.append('5 6');

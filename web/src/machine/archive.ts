@@ -85,6 +85,7 @@ export class PrintLog {
   readonly #tell: Tell;
   #isOver = false;
   #copying: Promise<void> = Promise.resolve();
+  readonly #closing = new AbortController();
 
   constructor(id: string, number: number, { open, letGo }: Opened, tell: Tell) {
     this.id = id;
@@ -114,23 +115,27 @@ export class PrintLog {
   }
 
   async #copy(file: Blob, hasRoom: Promise<boolean>): Promise<void> {
-    const goOn = (): void => {
-      if (this.#isOver) throw new StorageError('incomplete');
-    };
     try {
       if (!(await hasRoom.catch(() => true))) throw new StorageError('full');
-      await this.#open.copyFile(file.stream(), goOn);
+      await this.#open.copyFile(this.#read(file));
     } catch (error) {
-      goOn();
+      if (this.#isOver) return;
       // The file will have to be given again: then it is known again, at least.
-      await this.#open.markFile(file.stream(), goOn);
+      await this.#open.markFile(this.#read(file));
       throw error;
     }
+  }
+
+  /** Breaks off when the record is closed, even where the file is just not to be had. */
+  #read(file: Blob): ReadableStream<Uint8Array> {
+    const { signal } = this.#closing;
+    return file.stream().pipeThrough(new TransformStream<Uint8Array, Uint8Array>(), { signal });
   }
 
   /** Settles once nothing of it is open any more. */
   async close(): Promise<void> {
     this.#isOver = true;
+    this.#closing.abort();
     this.#open.close();
     await this.#copying;
     this.#letGo();

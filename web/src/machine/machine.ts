@@ -233,7 +233,6 @@ export class Machine {
     try {
       const feeder = await Feeder.open(file, this.session).catch((error: unknown) => fileUnreadable(error));
       if (!(feeder instanceof Feeder)) return feeder;
-      await this.#logClosed;
       const log = feeder.failure === undefined ? await openLog() : null;
       const trouble = this.#begin(feeder, log, confirmedLines, now);
       if (trouble || this.#freed) {

@@ -146,7 +146,7 @@ export class OpenPrint {
     }
   }
 
-  /** Keeps a copy of the print's file, in pieces; `progress` is told the bytes so far, and may throw to break it off. */
+  /** Keeps a copy of the print's file, in pieces; `progress` is told the bytes so far. */
   async copyFile(
     stream: ReadableStream<Uint8Array>,
     progress: (bytes: number) => void = () => undefined,
@@ -159,10 +159,10 @@ export class OpenPrint {
     });
   }
 
-  /** Reads the file through without a copy of it: by its check it is known again. `progress` as with a copy. */
-  async markFile(stream: ReadableStream<Uint8Array>, progress: (bytes: number) => void): Promise<void> {
+  /** Reads the file through without a copy of it: by its check it is known again. */
+  async markFile(stream: ReadableStream<Uint8Array>): Promise<void> {
     await tried(async () => {
-      const mark = await fill(null, stream, progress);
+      const mark = await fill(null, stream, () => undefined);
       await this.#folder.removeEntry(FILE).catch(ignoreMissing);
       await writeWhole(this.#folder, COMPLETE, new TextEncoder().encode(mark));
     });
