@@ -1,9 +1,11 @@
 // A page that dies in the middle of a print, or loses its printer: the board holds the print, and another page, or the
 // same one, goes on with the very next step, at the user's word. Judged by the device's own record.
+import { writeFile } from 'node:fs/promises';
 import type { Locator, Page } from '@playwright/test';
 import { made, plannedBehind } from '../fixtures/pulses.ts';
 import { expect, measured, type SerialPanel, test } from '../fixtures/serial.ts';
 import { climbing } from '../serial/gcode.ts';
+import { sampleConfig } from '../serial/planner.ts';
 import type { BridgePort } from '../serial/port.ts';
 import { PrinterDevice } from '../serial/printer.ts';
 
@@ -79,6 +81,18 @@ async function atRest(printer: PrinterDevice): Promise<void> {
   expect(printer.state().shutdown).toBeNull();
 }
 
+/** With another machine in use the page asks before it connects: the board would be restarted by that. */
+async function declineOtherMachine(panel: SerialPanel): Promise<void> {
+  const path = test.info().outputPath('other.cfg');
+  await writeFile(path, `${sampleConfig()}\n# another one\n`);
+  await panel.look(path);
+  await panel.closeDialog(panel.dialog('Machine'));
+  const dialog = await panel.chooseSerial();
+  await dialog.getByRole('button', { name: 'Connect', exact: true }).click();
+  await panel.answer('Connect with another machine file?', 'Do not connect');
+  await expect(panel.status).toContainText('Not connected');
+}
+
 /** From what the page shows as held to the end of the print: every step of the plan, and none besides. */
 async function goOn({ printer, panel }: Pick<Under, 'printer' | 'panel'>, gcode = GCODE): Promise<void> {
   const dialog = held(panel.page);
@@ -121,6 +135,7 @@ test('the renderer is killed: another page takes the print up and goes on', asyn
   await atRest(printer);
   const again = await open();
   await expect(notices(again.page)).toContainText('The print of part.gcode was interrupted');
+  await declineOtherMachine(again);
   const began = performance.now();
   await notices(again.page).getByRole('button', { name: 'Connect' }).click();
   await again.connectIn(again.dialog('Connect'));
