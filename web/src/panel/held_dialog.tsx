@@ -81,9 +81,10 @@ function Known({ print }: { readonly print: KeptPrint }): JSX.Element {
       </Fact>
       <Fact name="Last heard of">{timeOf(heardOf)}</Fact>
       <Fact name="Held for">{since(heardOf)}</Fact>
-      {snapshot.value?.heaters.map(({ name, temperature, target }) => (
+      {snapshot.value?.heaters.map(({ name, temperature, target, isStandby }) => (
         <Fact key={name} name={HEATERS[name]}>
           {formatNumber(temperature, 1)} °C{target > 0 && ` of ${formatNumber(target)}`}
+          {isStandby && ', stand-by'}
         </Fact>
       ))}
     </dl>
