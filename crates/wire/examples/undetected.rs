@@ -54,7 +54,7 @@ fn measure(blocks: u64, seed: u64, damage: Damage, check: Option<&BlockCheck>) -
     let mut deframer = Deframer::new();
     let mut last: VecDeque<Block> = VecDeque::new();
     let mut counts = Counts { sent: blocks, ..Counts::default() };
-    let room = PAYLOAD_BYTES_MAX - check.map_or(0, |check| check.len());
+    let room = PAYLOAD_BYTES_MAX - check.map_or(0, wire::check::BlockCheck::len);
     let mut payload = [0; PAYLOAD_BYTES_MAX];
     // How many bytes stay sound until the next one that does not.
     let mut sound = gap(&mut chance);
@@ -103,5 +103,5 @@ fn measure(blocks: u64, seed: u64, damage: Damage, check: Option<&BlockCheck>) -
 /// The sound bytes before the next damaged one: a geometric distribution.
 fn gap(chance: &mut Pcg32) -> usize {
     let unit = (f64::from(chance.next_u32()) + 1.0) / (f64::from(u32::MAX) + 1.0);
-    (unit.ln() / (1.0 - DAMAGE).ln()) as usize
+    (libm::log(unit) / libm::log(1.0 - DAMAGE)) as usize
 }
