@@ -123,12 +123,9 @@ test('unplugged while printing: the board comes to rest by itself, and nothing s
   bridge.replug(port);
   await expectOffered(panel, port, 1);
   await panel.connectOffered();
-  // The board begins anew: nothing of the print is left, and it does not know where the head is.
-  await expect(panel.status).toContainText('Ready');
-  await expect(panel.print).toBeEnabled();
-  await expect(panel.motion).toContainText('Home first');
+  // The board holds the print, which is found again and still waits for the user.
+  await expect(panel.status).toContainText('Held');
   expect(pulses(printer)).toEqual(still);
-  expect(duties(printer)).toEqual([0, 0]);
 });
 
 test('a terminal that hangs up without a word is lost too', async ({ bridge, open }) => {

@@ -75,7 +75,7 @@ for (const isTerminal of [false, true]) {
     await expect(panel.alert).toContainText('The device is there again.');
     expect(port.counts.openings).toBe(1);
     await reconnect.click();
-    await expect(panel.status).toContainText(/Holding a print|Ready/);
+    await expect(panel.status).toContainText(/Holding a print|Held|Ready/);
     expect(port.counts.openings).toBe(2);
   });
 }

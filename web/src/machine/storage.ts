@@ -10,7 +10,7 @@ import { Crc32 } from './crc32';
 /** Prints that are kept, the one that is open included. */
 export const PRINTS_MAX = 8;
 /** A journal that grows beyond this is not one of ours. */
-export const JOURNAL_BYTES_MAX = 256 * 1024 * 1024;
+export const JOURNAL_BYTES_MAX = 64 * 1024 * 1024;
 /** So much stays free when a file is copied: the journal needs room, too. */
 const SPARE_BYTES = 32 * 1024 * 1024;
 /** So much of a copy is brought to the disk at once: the worker that drives the printer waits for it. */

@@ -54,6 +54,8 @@ pub enum Input {
     Speed(f64),
     /// The extrusion factor.
     Flow(f64),
+    /// The user set the fan, 0 ..= 1. Not part of the plan either.
+    Fan(f64),
     /// The user set a heater, in °C. Not part of the plan, but of what it is carried out with.
     Target(HeaterName, f64),
 }
@@ -75,6 +77,16 @@ pub enum HeaterName {
     Nozzle,
     /// The bed.
     Bed,
+}
+
+impl HeaterName {
+    /// As everywhere else.
+    pub(crate) const fn heater(self) -> gcode::Heater {
+        match self {
+            Self::Nozzle => gcode::Heater::Tool(0),
+            Self::Bed => gcode::Heater::Bed,
+        }
+    }
 }
 
 /// A line of a journal.

@@ -15,7 +15,7 @@ use units::{Celsius, Clock32, Seconds, Ticks};
 use wire::RowCheck;
 
 use super::{
-    CountedRun, HeaterName, Input, Journal, Place, RowPlace, machine_check,
+    CountedRun, Input, Journal, Place, RowPlace, machine_check,
     rows::{BoardQueue, Row},
 };
 use crate::{
@@ -63,6 +63,8 @@ pub(crate) struct Continuation {
     pub(crate) runs: u32,
     /// Inputs of the journal that have come into force.
     pub(crate) inputs: usize,
+    /// Those that had not, and hold from here on.
+    pub(crate) adopted: Vec<Input>,
     /// The low half of the motion clock of the run's start.
     pub(crate) start: Clock32,
     /// When the run ends, if that is known.
@@ -145,8 +147,10 @@ impl Replay {
         let wanted = journal.runs.iter().rfind(|run| run.id == queue.id);
         let wanted = *wanted.ok_or_else(|| differs("the board carries out something else"))?;
         let mut planner = Planner::new(config, clock)?;
-        planner.stand_at(journal.position);
-        (0..3).for_each(|axis| planner.guard.set_homed(axis, journal.homed[axis]));
+        if journal.start_line.is_none() {
+            planner.stand_at(journal.position);
+            (0..3).for_each(|axis| planner.guard.set_homed(axis, journal.homed[axis]));
+        }
         // What is planned has been printed before; how hot it is now is judged when it goes on.
         planner.guard.extrusion = ExtrusionPermit::Allowed;
         let mut source = Source::new(machine::gcode_settings(config));
@@ -223,6 +227,11 @@ impl Replay {
             match self.planner.next(&mut self.source)? {
                 Planned::NeedsInput => {
                     let place = Place { drained: Some(self.source.fed()), ..self.place };
+                    let is_behind =
+                        |(at, _): &(Place, Input)| at.drained.is_some_and(|until| until <= self.source.fed());
+                    if place == self.place && self.inputs.front().is_some_and(is_behind) {
+                        return Err(differs("its journal does not belong to this file"));
+                    }
                     if place == self.place {
                         return Ok(Advance::NeedsInput);
                     }
@@ -241,12 +250,14 @@ impl Replay {
     pub(crate) fn finish(self) -> Continuation {
         let mut source = self.source;
         // What the user had set last holds, though it had not come into force where the board is.
-        for (_, input) in &self.inputs {
-            apply_factor(&mut source, *input);
+        let adopted: Vec<Input> =
+            self.inputs.iter().map(|(_, input)| *input).filter(|input| *input != Input::FinishRun).collect();
+        for &input in &adopted {
+            apply_factor(&mut source, input);
         }
         let from = core::array::from_fn(|motor| {
             let (base, queue) = (self.wanted.from[motor], self.queue.motors[motor]);
-            let done = base.done + queue.done;
+            let done = base.done.saturating_add(queue.done);
             // The first row that is counted may be the rest of one: then that has not been made whole before.
             let left = if queue.done == 0 && queue.left == 0 { base.left } else { queue.left };
             RowPlace { done, left }
@@ -259,6 +270,7 @@ impl Replay {
             place: self.place,
             runs: self.runs,
             inputs: self.inputs_done,
+            adopted,
             start: Clock32(self.wanted.start),
             made_until: self.made_until,
             end: self.end,
@@ -285,12 +297,9 @@ impl Replay {
                 self.planner.finish_run();
             }
             Input::Target(heater, celsius) => {
-                let heater = match heater {
-                    HeaterName::Nozzle => Heater::Tool(0),
-                    HeaterName::Bed => Heater::Bed,
-                };
-                self.set_target(heater, Celsius(celsius));
+                self.set_target(heater.heater(), Celsius(celsius));
             }
+            Input::Fan(speed) => self.fan = speed,
             Input::Speed(_) | Input::Flow(_) => apply_factor(&mut self.source, input),
         }
     }
@@ -411,7 +420,7 @@ impl Replay {
             Row { interval, count, add, forward: motor.forward, start: command.start, end: command.end };
         motor.rows += 1;
         if index < base.done {
-            motor.made += row.counted(count);
+            motor.made = motor.made.wrapping_add(row.counted(count));
             self.made_until = self.made_until.max(row.end);
             return Ok(());
         }
@@ -432,7 +441,7 @@ impl Replay {
             }
         }
         if counted < queue.done {
-            motor.made += row.counted(row.count);
+            motor.made = motor.made.wrapping_add(row.counted(row.count));
             self.made_until = self.made_until.max(row.end);
         } else {
             if counted == queue.done && queue.left > 0 {
@@ -454,7 +463,7 @@ impl Replay {
             return Err(differs("the board has other rows of steps than the plan has"));
         }
         let rest = row.tail(left);
-        self.motors[at].made += row.counted(row.count - left);
+        self.motors[at].made = self.motors[at].made.wrapping_add(row.counted(row.count - left));
         self.made_until = self.made_until.max(rest.start);
         Ok(rest)
     }
@@ -464,7 +473,7 @@ impl Replay {
         let has = |motor: usize| {
             let (made, base) = (&self.motors[motor], self.wanted.from[motor]);
             // A row of which some steps had been made before is only right without them.
-            let first = base.done + u32::from(base.left > 0);
+            let first = base.done.saturating_add(u32::from(base.left > 0));
             made.rows >= first && made.counted >= self.queue.motors[motor].received
         };
         (0..MOTORS).all(has)
@@ -475,6 +484,6 @@ fn apply_factor(source: &mut Source, input: Input) {
     match input {
         Input::Speed(factor) => source.interpreter.set_speed_factor(factor),
         Input::Flow(factor) => source.interpreter.set_flow_factor(factor),
-        Input::FinishRun | Input::Target(..) => {}
+        Input::FinishRun | Input::Fan(_) | Input::Target(..) => {}
     }
 }

@@ -113,7 +113,8 @@ impl Asking {
                 None => return Answer::Pending,
             }
         }
-        if queue.id == 0 {
+        let is_absurd = |motor: &MotorQueue| motor.done > motor.received;
+        if queue.id == 0 || queue.motors.iter().any(is_absurd) {
             return Answer::Nothing;
         }
         queue.is_held = report.state == MotionState::Held;

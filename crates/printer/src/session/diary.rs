@@ -70,11 +70,15 @@ impl Diary {
     pub(super) fn take_up(&mut self, taken: &Continuation, now: Seconds) {
         self.writer.write(&Record::Continued { inputs: taken.inputs });
         let (place, runs, id) = (taken.place, taken.runs, taken.id);
+        for &input in &taken.adopted {
+            self.writer.write(&Record::Input { at: place, input });
+        }
         self.job = Some(Job { place, runs, id, told: now });
     }
 
-    /// The job is over.
-    pub(super) fn end(&mut self) {
+    /// The job is over, at rest: the board holds nothing any more that could be gone on with.
+    pub(super) fn end(&mut self, board: &mut Board) {
+        self.other_run(board);
         if self.job.take().is_some() {
             self.writer.write(&Record::Ended);
         }

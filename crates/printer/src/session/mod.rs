@@ -46,7 +46,7 @@ use self::{
 use crate::{
     config::PrinterConfig,
     error::{Ended, ErrorCode, PrinterError},
-    journal::{Continuation, Journal},
+    journal::{Continuation, Journal, PENDING_BYTES_MAX},
     link::LinkStats,
 };
 
@@ -139,7 +139,10 @@ impl Session {
     fn collect_events(&mut self) {
         if let Stage::Ready(ready) = &mut self.stage {
             self.events.append(&mut ready.events);
-            self.journal.push_str(&ready.diary.take());
+            // An owner that takes none keeps no journal, and the writer has a bound of its own.
+            if self.journal.len() < PENDING_BYTES_MAX {
+                self.journal.push_str(&ready.diary.take());
+            }
         }
     }
 

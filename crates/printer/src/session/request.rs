@@ -40,7 +40,10 @@ impl Session {
                 ready.thermal.set_target(heater, target, &mut ready.board, now)?;
                 ready.diary.target(heater, target.0);
             }
-            Request::SetFan(speed) => ready.thermal.set_fan(speed, None, &mut ready.board, now),
+            Request::SetFan(speed) => {
+                ready.thermal.set_fan(speed, None, &mut ready.board, now);
+                ready.diary.input(Input::Fan(speed));
+            }
             Request::SetSpeedFactor(factor) => {
                 ready.sources().for_each(|source| source.interpreter.set_speed_factor(factor));
                 ready.diary.input(Input::Speed(factor));
@@ -231,6 +234,7 @@ impl Ready {
             let detail = format!("an axis cannot stand at {position}");
             return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail));
         }
+        self.diary.other_run(&mut self.board);
         self.planner.set_axis(axis, position.0, true);
         self.planner.correct(&mut self.console.source);
         Ok(())

@@ -163,6 +163,9 @@ impl Thermal {
             if goal > Celsius::ZERO && (channel.has_fallen() || channel.heater.target() == Celsius::ZERO) {
                 any = true;
                 self.set_target(name, goal, board, now)?;
+            } else if goal > Celsius::ZERO {
+                // The board has gone on with it all the time.
+                channel.wanted = goal;
             }
         }
         Ok(any)

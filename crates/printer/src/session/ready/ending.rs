@@ -207,7 +207,7 @@ impl Ready {
 
     fn forget_job(&mut self, event: Event) {
         self.job = None;
-        self.diary.end();
+        self.diary.end(&mut self.board);
         self.held = Held::default();
         self.planner.drop_barrier();
         self.console.clear();

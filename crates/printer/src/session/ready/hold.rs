@@ -18,7 +18,7 @@ use crate::{
     session::{
         board::FAN_LANE,
         event::Event,
-        job::{JobState, JobStatus},
+        job::{Job, JobState, JobStatus},
         layout::StepperOids,
         lease::Cover,
         motion_time::{HoldReason, MotionReport, MotionState},
@@ -152,6 +152,11 @@ impl Ready {
                 return;
             }
             hold.phase = Phase::AtRest;
+            if self.job.as_ref().is_some_and(Job::is_ending) {
+                // The user has ended it while it slowed down.
+                self.cancel_held(now);
+                return;
+            }
             hold.is_told = true;
             let error = match hold.rest {
                 Some(_) => ErrorCode::HeldForHost.into(),
@@ -249,9 +254,11 @@ impl Ready {
             "the computer did not reach the printer in time: its board lowered the heaters to stand-by";
         self.events.push(Event::Message(text.into()));
         match &mut self.hold {
-            Some(Hold { phase: phase @ Phase::Heating, reason, .. }) => {
-                *phase = Phase::AtRest;
-                self.events.push(Event::Held(hold_error(*reason, self.calls.gap.take())));
+            Some(hold)
+                if matches!(hold.phase, Phase::Heating | Phase::Rejoining { .. } | Phase::Resuming(None)) =>
+            {
+                hold.phase = Phase::AtRest;
+                self.events.push(Event::Held(hold_error(hold.reason, self.calls.gap.take())));
             }
             Some(_) => {}
             None if matches!(self.wait, Wait::Heat) => {
@@ -268,7 +275,12 @@ impl Ready {
 
     /// Ends what is held; `false` where nothing is.
     pub(super) fn cancel_held(&mut self, now: Seconds) -> bool {
-        let may_end = |hold: &&mut Hold| matches!(hold.phase, Phase::AtRest | Phase::Heating);
+        let may_end = |hold: &&mut Hold| {
+            matches!(
+                hold.phase,
+                Phase::AtRest | Phase::Heating | Phase::Rejoining { .. } | Phase::Resuming(None)
+            )
+        };
         let Some(hold) = self.hold.as_mut().filter(may_end) else { return false };
         let asked = Seconds(f64::NEG_INFINITY);
         hold.phase = Phase::Dropping { since: now, asked, counts: [None; MOTORS] };
@@ -327,7 +339,13 @@ impl Ready {
             Phase::AtRest => self.cool_down(now),
             Phase::Heating => {
                 self.last_active = now;
-                if self.thermal.is_heated() {
+                let is_cold = self.extrusion_permit() != ExtrusionPermit::Allowed;
+                if self.thermal.is_heated() && hold.could_extrude && is_cold {
+                    // It was switched off meanwhile: that is no way to go on.
+                    hold.phase = Phase::AtRest;
+                    let detail = "the nozzle was switched off while it was heated again";
+                    self.events.push(Event::Held(PrinterError::new(ErrorCode::ColdExtrusion, detail)));
+                } else if self.thermal.is_heated() {
                     hold.phase = hold.warm(now);
                 }
             }

@@ -262,6 +262,9 @@ impl Ready {
     /// Does what is due by the motion clock, and what follows from it.
     fn go_on(&mut self, now: Seconds) -> Result<(), Failure> {
         if self.waits_to_rejoin() {
+            if core::mem::take(&mut self.have_heaters_fallen) {
+                self.heaters_fell(now);
+            }
             return self.advance_hold(now);
         }
         let motion_now = self.board.motion_at(now);
@@ -312,6 +315,9 @@ impl Ready {
         }
         match action {
             TimedAction::SetTemperature { heater, target } => {
+                if !self.plans_job() {
+                    self.diary.target(heater, target.0);
+                }
                 if let Err(error) = self.thermal.set_target(heater, target, &mut self.board, now) {
                     self.source_failed(error.at_line(line.0), now);
                 }

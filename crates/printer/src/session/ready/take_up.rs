@@ -12,7 +12,7 @@ use super::Ready;
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
-    journal::{BoardQueue, Continuation, MotorQueue, Row, RowPlace, TimedDue},
+    journal::{BoardQueue, Continuation, Input, MotorQueue, Row, RowPlace, TimedDue},
     machine::{self, MOTORS},
     planner::TimedAction,
     session::{
@@ -51,7 +51,13 @@ impl Ready {
         now: Seconds,
     ) -> Result<Self, (Box<Board>, PrinterError)> {
         let motion_now = board.motion_at(now);
-        let start = motion_now.saturating_sub(taken.made_until).nearest(taken.start);
+        let mut start = motion_now.saturating_sub(taken.made_until).nearest(taken.start);
+        // A run that has come to its end is over, however long ago: of its clock only 32 bits are known.
+        if let Some(end) = taken.end.filter(|_| !queue.is_held) {
+            while start + end > motion_now && start.0 > 1 << 32 {
+                start = Ticks(start.0 - (1 << 32));
+            }
+        }
         let clocks = taken.backlog.iter().zip(&queue.motors).filter(|(_, motor)| motor.left > 0);
         let agrees = |(rows, motor): (&VecDeque<Row>, &MotorQueue)| {
             rows.front().is_some_and(|row| (start + row.first()).low() == motor.next)
@@ -96,6 +102,14 @@ impl Ready {
                 }
                 TimedDue::Action(_, action) => rest.pass(&action),
                 TimedDue::Move(_) => {}
+            }
+        }
+        for &input in &taken.adopted {
+            match input {
+                Input::Target(heater, celsius) => rest
+                    .pass(&TimedAction::SetTemperature { heater: heater.heater(), target: Celsius(celsius) }),
+                Input::Fan(speed) => rest.fan = speed,
+                Input::FinishRun | Input::Speed(_) | Input::Flow(_) => {}
             }
         }
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
