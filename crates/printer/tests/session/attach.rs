@@ -337,3 +337,108 @@ fn a_host_that_was_away_for_long_heats_again_before_the_next_step() {
         bench.assert_all_off();
     }
 }
+
+#[test]
+fn what_the_user_set_last_outlives_every_host() {
+    let setup = Setup::default();
+    let file = squares(6);
+    let (mut bench, from) = started(&setup, &file);
+    bench.until("motion", 100.0, |bench| bench.pulses().len() > from + 3000);
+    // Planned far ahead, so none of it is in force where the board is.
+    bench.ask(Request::SetSpeedFactor(0.5));
+    bench.ask(Request::SetTemperature(gcode::Heater::Tool(0), units::Celsius(80.0)));
+    bench.run(0.05);
+    die(&mut bench, &setup, 0.2);
+    take_up(&mut bench, &file);
+    assert_eq!(bench.session.factors()[0], 0.5);
+    // Nobody says yes, and that host dies too.
+    die(&mut bench, &setup, 400.0);
+    take_up(&mut bench, &file);
+    assert_eq!(bench.session.factors()[0], 0.5);
+    bench.ask(Request::Resume);
+    let pulses = bench.pulses().len();
+    bench.until("motion", 300.0, |bench| bench.pulses().len() > pulses);
+    assert!(bench.celsius(0) > 75.0, "it goes on at {} °C", bench.celsius(0));
+    bench.run(1.5);
+    die(&mut bench, &setup, 0.2);
+    take_up(&mut bench, &file);
+    bench.ask(Request::Resume);
+    bench.job_over();
+    bench.job_done();
+    bench.assert_all_off();
+}
+
+#[test]
+fn what_is_done_by_hand_in_a_pause_is_no_print_to_be_taken_up() {
+    let setup = setup(BoardProfile::rp2040());
+    for by_hand in [Request::Gcode("M84".into()), Request::SetPosition { axis: 2, position: units::Mm(3.0) }]
+    {
+        let (mut bench, _) = started(&setup, &file());
+        bench.run(3.0);
+        bench.ask(Request::Pause);
+        bench.until("the pause", 30.0, |bench| bench.session.job_status() == JobStatus::Paused);
+        bench.ask(by_hand);
+        bench.run(1.0);
+        die(&mut bench, &setup, 0.5);
+        bench.connect();
+        assert_eq!(bench.session.position().unwrap().1, [false; 3]);
+    }
+    // A pause in which nothing was done is as good as a hold, however long it lasts.
+    let (expected, _) = clean(&setup, &file());
+    for seconds in [1.0, 100.0, 200.0, 300.0, 3000.0] {
+        let (mut bench, from) = started(&setup, &file());
+        bench.run(3.0);
+        bench.ask(Request::Pause);
+        bench.until("the pause", 30.0, |bench| bench.session.job_status() == JobStatus::Paused);
+        die(&mut bench, &setup, seconds);
+        take_up(&mut bench, &file());
+        bench.ask(Request::Resume);
+        let pulses = bench.pulses().len();
+        bench.until("motion", 10.0, |bench| bench.pulses().len() > pulses);
+        bench.job_over();
+        bench.job_done();
+        // Where it was paused the run came to rest, which the clean print did not: the same number of steps.
+        let count = |steps: &[Vec<bool>]| steps.iter().map(Vec::len).collect::<Vec<_>>();
+        assert_eq!(count(&steps(&mut bench, from)), count(&expected), "{seconds}");
+    }
+}
+
+#[test]
+fn a_print_that_is_over_is_not_held() {
+    let setup = setup(BoardProfile::rp2040());
+    for cancelled in [false, true] {
+        let (mut bench, _) = started(&setup, &file());
+        if cancelled {
+            bench.run(2.0);
+            bench.ask(Request::Cancel);
+        }
+        bench.job_over();
+        die(&mut bench, &setup, 0.5);
+        bench.until("ready", 12.0, |bench| {
+            assert_ne!(bench.session.phase(), PhaseName::Holding);
+            bench.session.phase() == PhaseName::Ready
+        });
+    }
+}
+
+#[test]
+fn heat_that_falls_again_is_asked_about_again() {
+    let setup = Setup::default();
+    let file = squares(3);
+    let (mut bench, from) = started(&setup, &file);
+    bench.until("motion", 100.0, |bench| bench.pulses().len() > from + 9000);
+    die(&mut bench, &setup, 900.0);
+    take_up(&mut bench, &file);
+    bench.ask(Request::Resume);
+    bench.run(1.0);
+    let pulses = bench.pulses().len();
+    bench.stalled = true;
+    bench.run(30.0);
+    bench.stalled = false;
+    bench.run(60.0);
+    assert_eq!(bench.session.job_status(), JobStatus::Held);
+    assert_eq!(bench.pulses().len(), pulses);
+    bench.ask(Request::Resume);
+    bench.job_over();
+    bench.job_done();
+}
