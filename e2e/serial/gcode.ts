@@ -45,12 +45,35 @@ export function endOf(gcode: string): [number, number, number] {
   return place;
 }
 
-/** A print of XY moves alone that heats both heaters without waiting, rests after homing, and takes at least so long. */
-export function strolling(seconds: number): string {
+/**
+ * A print of XY moves alone that heats both heaters without waiting, or leaves them cold, rests after homing, and takes
+ * at least so long.
+ */
+export function strolling(seconds: number, isCold = false): string {
   const speedMmS = 100;
   const sides = Math.ceil((seconds * speedMmS) / 100);
   const corners = ['X150 Y50', 'X150 Y150', 'X50 Y150', 'X50 Y50'];
   const moves = Array.from({ length: sides }, (_, side) => `G1 ${corners[side % corners.length]}`);
-  const start = ['M140 S60', 'M104 S200', 'G28', 'G4 P8000', 'G1 X50 Y50 Z5 F6000'];
+  const heat = isCold ? [] : ['M140 S60', 'M104 S200'];
+  const start = [...heat, 'G28', 'G4 P8000', 'G1 X50 Y50 Z5 F6000'];
   return [...start, ...moves, 'M104 S0', 'M140 S0', ''].join('\n');
+}
+
+/** The same with a layer every few sides: moves of Z, the fan, and a wait, so that there are several runs of motion. */
+export function climbing(seconds: number, isCold = true): string {
+  const lines = strolling(seconds, isCold).split('\n');
+  const at = lines.findIndex((line) => line.startsWith('G1 X50')) + 1;
+  const sides = lines.slice(at, -3);
+  const layers = sides.flatMap((line, side) => {
+    const layer = side / 8;
+    if (!Number.isInteger(layer) || side === 0) return [line];
+    const wait = layer % 2 === 0 ? ['M400', 'G4 P200'] : [];
+    return [
+      `G1 Z${(5 + layer / 5).toFixed(1)} F600`,
+      `M106 S${(40 * layer) % 256}`,
+      ...wait,
+      `${line} F6000`,
+    ];
+  });
+  return [...lines.slice(0, at), ...layers, 'M107', ...lines.slice(-3)].join('\n');
 }

@@ -1,38 +1,14 @@
 // Prints on a printer on USB through the page, judged by the device's own record.
+import { made, plannedBehind } from '../fixtures/pulses.ts';
 import { expect, measured, type SerialPanel, test } from '../fixtures/serial.ts';
-import { endOf, slice, strolling, upTo } from '../serial/gcode.ts';
-import { planned } from '../serial/planner.ts';
+import { endOf, slice, strolling } from '../serial/gcode.ts';
 import { PrinterDevice } from '../serial/printer.ts';
 
 /** At most so much faster than real; where the computer is slower, both clocks wait. */
 const FAST = { vendor: 0x1d50, product: 0x614e, shared: true, speed: 100 } as const;
 const PRINT_TIMEOUT_MS = 100_000;
-/** Nothing stands still so long between homing and the print proper but what the file makes wait. */
-const REST_MIN_S = 5;
 /** Switches close a step or two from where they should. */
 const HOMING_ERROR_MM = 0.05;
-
-/** The pulses made by homing and what comes with it: at the first long rest after Z has moved. */
-function pulsesBeforePrint(printer: PrinterDevice): readonly number[] {
-  const homed = printer.samples.filter(({ pulses }) => (pulses[2] ?? 0) > 0);
-  const rest = homed.find(({ timeS, pulses }) => {
-    const first = homed.find((other) => other.pulses.every((count, motor) => count === pulses[motor]));
-    return first !== undefined && timeS - first.timeS >= REST_MIN_S;
-  });
-  if (!rest) throw new Error('the device never waited after homing');
-  return rest.pulses;
-}
-
-/** What the planner has for the rest of a file, behind the command that makes the device wait. */
-function plannedBehind(gcode: string, command: string): number[] {
-  const start = planned(upTo(gcode, command)).steps;
-  return planned(gcode).steps.map((steps, motor) => steps - (start[motor] ?? 0));
-}
-
-function made(printer: PrinterDevice): number[] {
-  const before = pulsesBeforePrint(printer);
-  return printer.state().motors.map((motor, index) => motor.pulses - (before[index] ?? 0));
-}
 
 async function printAll(panel: SerialPanel, gcode: string): Promise<void> {
   await expect(panel.status).toContainText('Ready');

@@ -2,18 +2,13 @@
 // printer, and goes on with a new worker.
 import type { Worker } from '@playwright/test';
 import { travels } from '../fixtures/gcode.ts';
+import { expectLooksAfterItself } from '../fixtures/on_its_own.ts';
 import { expect, type SerialPanel, test } from '../fixtures/serial.ts';
+import { machineWorker } from '../fixtures/worker.ts';
 import { strolling } from '../serial/gcode.ts';
 import { PrinterDevice } from '../serial/printer.ts';
 
 const FAST = { vendor: 0x1d50, product: 0x614e, shared: true, speed: 50 } as const;
-
-async function machineWorker(panel: SerialPanel): Promise<Worker> {
-  for (const worker of panel.page.workers()) {
-    if ((await worker.evaluate(() => self.name)) === 'machine') return worker;
-  }
-  throw new Error('there is no worker of that name');
-}
 
 /** From now on the planner fails whenever it is asked how things are. */
 const breakPlanner = (worker: Worker): Promise<void> =>
@@ -41,14 +36,14 @@ test('with a printer on USB: the port is free again, and connecting works', asyn
   await expect(panel.status).toContainText('Ready');
   await panel.dropText(strolling(600));
   await panel.startPrint();
-  await breakPlanner(await machineWorker(panel));
+  await breakPlanner(await machineWorker(panel.page));
   await expectTold(panel);
   await expect(panel.alert).toContainText('The printer is on its own');
   await expect.poll(() => port.holder).toBeUndefined();
-  await expect.poll(() => printer.state().heaters.map(({ duty }) => duty)).toEqual([0, 0]);
-  // The board has stopped for want of orders, and the new worker gets through to it.
+  await expectLooksAfterItself(printer);
+  // The board holds what it had, and the new worker gets through to it.
   await panel.connectOffered();
-  await expect(panel.status).toContainText(/Stopped|Ready/);
+  await expect(panel.status).toContainText(/Holding a print|Held|Ready/);
   expect(port.counts.openings).toBe(2);
 });
 
@@ -57,7 +52,7 @@ test('with the virtual printer: the page does not go on as if it printed', async
   await panel.connectVirtual();
   await panel.dropText(travels(3000).gcode);
   await panel.startPrint();
-  await breakPlanner(await machineWorker(panel));
+  await breakPlanner(await machineWorker(panel.page));
   await expectTold(panel);
   await expect(panel.alert).toContainText('The virtual printer was a part of the page');
   await panel.connectVirtual();
@@ -67,7 +62,7 @@ test('with the virtual printer: the page does not go on as if it printed', async
 test('an error that nobody caught ends the connection, too', async ({ open }) => {
   const panel = await open();
   await panel.connectVirtual();
-  const worker = await machineWorker(panel);
+  const worker = await machineWorker(panel.page);
   await worker.evaluate(() => void Promise.reject(new Error('nobody catches this')));
   await expect(panel.alert).toContainText('has stopped. (nobody catches this)');
   await panel.connectVirtual();
@@ -77,7 +72,7 @@ test('a worker that hangs: what is shown is marked as old, and disconnecting end
   const panel = await open();
   await panel.connectVirtual();
   await expect(panel.heater('Nozzle')).toContainText('Off');
-  const worker = await machineWorker(panel);
+  const worker = await machineWorker(panel.page);
   await worker.evaluate(() => {
     setTimeout(() => {
       for (;;);

@@ -108,6 +108,7 @@ fn declarations(config: &Config) -> Vec<File> {
         one::<m::LayerSummary>(config),
         one::<m::FeatureSummary>(config),
         one::<m::PreviewSummary>(config),
+        one::<m::JournalView>(config),
         one::<m::VirtualState>(config),
         one::<m::MotorState>(config),
         one::<m::HeaterState>(config),

@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use printer::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
+    journal::{Journal, JournalError},
     session::{Event, JobOptions, JobStatus, PhaseName, ScheduledMove, Session},
 };
 use units::{Seconds, Ticks};
@@ -123,6 +124,28 @@ impl Host {
         self.session.job_end();
     }
 
+    /// What is to be added to the present print's journal.
+    pub fn take_journal(&mut self) -> String {
+        self.session.take_journal()
+    }
+
+    /// The number under which the board holds a print whose host is gone.
+    pub fn held_print(&self) -> Option<u32> {
+        self.session.held_print()
+    }
+
+    /// Takes up the print that the board holds; its file is then fed from the beginning.
+    pub fn take_up(&mut self, journal: &[u8]) -> Result<(), PrinterError> {
+        let refused =
+            |error: JournalError| PrinterError::new(ErrorCode::ContinuationRefused, error.to_string());
+        let journal = Journal::read(journal).map_err(refused)?;
+        self.session.take_up(&journal)?;
+        let (line, elapsed) = journal.progress.unwrap_or_default();
+        (self.line, self.elapsed_s, self.fed_bytes) = (line, elapsed.0, 0);
+        self.queued_least = None;
+        Ok(())
+    }
+
     fn sort_events(&mut self) {
         for event in self.session.take_events() {
             self.remember(&event);
@@ -165,11 +188,17 @@ impl Host {
                 self.speeds.stop(*at);
             }
             Event::Temperature { .. } => {
-                if let Some(UiEvent::Temperature { heater, temperature_c, target_c, duty }) =
+                if let Some(UiEvent::Temperature { heater, temperature_c, target_c, duty, standby }) =
                     UiEvent::of(event)
                 {
                     self.temperatures.retain(|known| known.heater != heater);
-                    self.temperatures.push(TemperatureView { heater, temperature_c, target_c, duty });
+                    self.temperatures.push(TemperatureView {
+                        heater,
+                        temperature_c,
+                        target_c,
+                        duty,
+                        standby,
+                    });
                     self.temperatures.sort_by_key(|known| known.heater as u8);
                 }
             }
@@ -202,7 +231,7 @@ impl Host {
 
     fn clock(&self, now: Seconds) -> Option<(Ticks, f64)> {
         let freq = self.board.as_ref()?.clock_freq_hz;
-        Some((self.session.board_clock(now)?, freq)).filter(|_| freq > 0.0)
+        Some((self.session.motion_clock(now)?, freq)).filter(|_| freq > 0.0)
     }
 
     /// Where the head is now, going evenly through the present move.
@@ -352,6 +381,24 @@ impl PrinterSession {
     /// The job's file has ended.
     pub fn job_end(&mut self) {
         self.host.job_end();
+    }
+
+    /// What is to be added to the present print's journal, where one is kept: text, to be stored before the bytes of the
+    /// last `poll` are sent.
+    pub fn take_journal(&mut self) -> String {
+        self.host.take_journal()
+    }
+
+    /// In the phase `holding`: the number under which the board holds a print (`journal_knows`).
+    pub fn held_print(&self) -> Option<u32> {
+        self.host.held_print()
+    }
+
+    /// In the phase `holding`: takes up the print with its journal. Its file is then fed as far as it is wanted, which
+    /// moves nothing; then the print is held here, until the user resumes or cancels it. What does not fit comes as an
+    /// error, and the board goes on holding.
+    pub fn take_up(&mut self, journal: &[u8]) -> Result<(), JsError> {
+        self.host.take_up(journal).map_err(|error| thrown(&error))
     }
 
     /// Everything that a panel shows: a `Snapshot` as JSON.

@@ -18,6 +18,7 @@ mod virtual_printer;
 use printer::{
     config::{ConfigDiagnostic, PrinterConfig, Severity, parse},
     error::{ErrorCode, PrinterError},
+    journal::Journal,
 };
 use wasm_bindgen::prelude::{JsError, wasm_bindgen};
 
@@ -25,7 +26,7 @@ pub use host::{Host, MOVE_NUMBERS};
 pub use simulation::Simulation;
 pub use speed::SPEED_PAIRS_MAX;
 
-use messages::{ConfigReport, ErrorMessage, FileKindReport, json};
+use messages::{ConfigReport, ErrorMessage, FileKindReport, JournalView, json};
 
 /// The most findings that are put into one message; [`parse_config`] gives all of them.
 const FINDINGS_SHOWN_MAX: usize = 5;
@@ -34,6 +35,13 @@ const FINDINGS_SHOWN_MAX: usize = 5;
 #[wasm_bindgen]
 pub fn parse_config(printer_cfg: &str) -> String {
     json(&ConfigReport::of(printer_cfg))
+}
+
+/// What a print's journal says: a `JournalView` as JSON, or nothing where it cannot be read. `held` is what
+/// `PrinterSession.held_print` gave, if anything did.
+#[wasm_bindgen]
+pub fn read_journal(journal: &[u8], held: Option<u32>) -> Option<String> {
+    Journal::read(journal).ok().map(|journal| json(&JournalView::of(&journal, held)))
 }
 
 /// What a file is, from its first bytes (4096 are enough) and its name: a `FileKindReport` as JSON.

@@ -5,7 +5,7 @@ import { LockstepLoop } from '../src/machine/lockstep';
 import { Machine } from '../src/machine/machine';
 import type { FromMachine } from '../src/machine/protocol';
 import { portTrouble } from '../src/machine/troubles';
-import { PortError } from '../src/transport/transport';
+import { NO_LINE_ERRORS, PortError } from '../src/transport/transport';
 import { seconds } from '../src/units';
 import { EchoPrinter, FakeSession } from './fake_session';
 
@@ -23,7 +23,7 @@ function made(parts: Partial<Parts> = {}) {
   const machine = new Machine(
     session,
     (message) => void told.push(message),
-    () => 0,
+    () => NO_LINE_ERRORS,
   );
   const connection = new Connection(
     {
@@ -113,7 +113,7 @@ test('a file that hangs while it is read does not hold up the end', async () => 
   const machine = new Machine(
     session,
     () => undefined,
-    () => 0,
+    () => NO_LINE_ERRORS,
   );
   const file = new Blob(['G28\n']);
   let reads = 0;

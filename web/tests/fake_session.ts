@@ -1,13 +1,15 @@
 // A session that does what a test tells it, for the loops around it.
 
 import type { VirtualState } from '../src/bindings/VirtualState';
-import type { JobStatus, MachineEvent, Phase, Trouble, Wish } from '../src/machine/protocol';
+import type { ConfirmedLines, JobStatus, MachineEvent, Phase, Trouble, Wish } from '../src/machine/protocol';
 import type { Session, SessionSnapshot, SimulatedPrinter } from '../src/machine/session';
 import { celsius, type Seconds, seconds, share } from '../src/units';
 
 const SNAPSHOT: SessionSnapshot = {
   phase: 'ready',
-  heaters: [{ name: 'extruder', temperature: celsius(20), target: celsius(0), duty: share(0) }],
+  heaters: [
+    { name: 'extruder', temperature: celsius(20), target: celsius(0), duty: share(0), isStandby: false },
+  ],
   position: null,
   homed: [false, false, false],
   job: 'none',
@@ -38,6 +40,11 @@ export class FakeSession implements Session {
   /** What everything throws from now on, as a planner that has panicked. */
   panic: Error | undefined;
   freed = false;
+  /** What waits to be taken, and under which number. */
+  journal: string[] = [];
+  journalNumber: number | null = null;
+  held: number | null = null;
+  readonly takenUp: string[] = [];
 
   #live(): void {
     if (this.panic) throw this.panic;
@@ -61,7 +68,18 @@ export class FakeSession implements Session {
     this.wishes.push(wish);
     return this.refusal;
   }
-  startJob(): Trouble | null {
+  startJob(_confirmed: ConfirmedLines, journal: number | null): Trouble | null {
+    this.journalNumber = journal;
+    return this.refusal;
+  }
+  takeJournal(): string {
+    return this.journal.splice(0).join('');
+  }
+  heldPrint(): number | null {
+    return this.held;
+  }
+  takeUp(journal: Uint8Array): Trouble | null {
+    this.takenUp.push(Buffer.from(journal).toString());
     return this.refusal;
   }
   jobWants(): number {

@@ -5,6 +5,7 @@ import { CHUNK_BYTES_MAX } from '../src/files';
 import { Feeder } from '../src/machine/feeder';
 import { Machine } from '../src/machine/machine';
 import type { FromMachine } from '../src/machine/protocol';
+import { NO_LINE_ERRORS } from '../src/transport/transport';
 import { seconds } from '../src/units';
 import { FakeSession } from './fake_session';
 
@@ -69,7 +70,7 @@ test('a file that cannot be read is not begun', async () => {
   const machine = new Machine(
     new FakeSession(),
     () => undefined,
-    () => 0,
+    () => NO_LINE_ERRORS,
   );
   const trouble = await machine.print(broken(1000), [], () => seconds(0));
   expect(trouble?.code).toBe('file-unreadable');
@@ -82,7 +83,7 @@ async function brokenOff(): Promise<{ session: FakeSession; machine: Machine; to
   const machine = new Machine(
     session,
     (message) => told.push(message),
-    () => 0,
+    () => NO_LINE_ERRORS,
   );
   let isThere = true;
   const file = new Blob([content]);

@@ -9,6 +9,7 @@ const heater = (name: HeaterState['name'], temperature: number, target = 0): Hea
   temperature: celsius(temperature),
   target: celsius(target),
   duty: share(0),
+  isStandby: false,
 });
 
 const ALWAYS = seconds(Number.NEGATIVE_INFINITY);

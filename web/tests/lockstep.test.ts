@@ -3,6 +3,7 @@
 import { expect, test, vi } from 'vitest';
 import { LockstepLoop } from '../src/machine/lockstep';
 import { Machine } from '../src/machine/machine';
+import { NO_LINE_ERRORS } from '../src/transport/transport';
 import { seconds } from '../src/units';
 import { EchoPrinter, FakeSession } from './fake_session';
 
@@ -22,7 +23,7 @@ function running(speed: number): Running {
   const machine = new Machine(
     session,
     () => undefined,
-    () => 0,
+    () => NO_LINE_ERRORS,
   );
   const loop = new LockstepLoop(machine, printer, speed, () => seconds(clock));
   loop.start((error) => {

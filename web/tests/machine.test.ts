@@ -3,6 +3,7 @@ import { expect, test, vi } from 'vitest';
 import { Machine } from '../src/machine/machine';
 import type { FromMachine } from '../src/machine/protocol';
 import { fileUnreadable } from '../src/machine/troubles';
+import { NO_LINE_ERRORS } from '../src/transport/transport';
 import { seconds } from '../src/units';
 import { FakeSession } from './fake_session';
 
@@ -10,7 +11,7 @@ function machine(): { machine: Machine; session: FakeSession; told: FromMachine[
   const told: FromMachine[] = [];
   const session = new FakeSession();
   const tell = (message: FromMachine): void => void told.push(message);
-  return { machine: new Machine(session, tell, () => 3), session, told };
+  return { machine: new Machine(session, tell, () => NO_LINE_ERRORS), session, told };
 }
 
 test('the planned speed is told with each snapshot while somebody watches it', () => {

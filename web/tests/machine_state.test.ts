@@ -9,6 +9,8 @@ import { type FakeWorker, fakeWorkers } from './fake_worker';
 type MachineWorker = FakeWorker<FromMachine, ToMachine>;
 
 const SERIAL: PortChoice = { kind: 'serial', id: { vendor: 1, product: 2, index: 0 }, baud: 250_000 };
+const MACHINE = { name: 'Test machine', config: '' };
+const FACTS = { name: 'part.gcode', time: seconds(60), lines: 100 };
 const NOW: Snapshot = { ...new FakeSession().snapshot(), wakeUps: { missed: 0, latest: seconds(0) } };
 
 let page: typeof import('../src/state/machine');
@@ -35,7 +37,7 @@ function last(): MachineWorker {
 function connected(snapshot: Snapshot = NOW): MachineWorker {
   const worker = last();
   worker.say({ kind: 'loaded' });
-  page.connect(SERIAL, '');
+  page.connect(SERIAL, MACHINE);
   worker.say({ kind: 'opened' });
   worker.say({ kind: 'snapshot', snapshot });
   return worker;
@@ -89,7 +91,7 @@ test('a script that cannot be loaded: the planner is missing, and no printer is 
 test('an emergency stop that is refused is shown, with what to do', async () => {
   const worker = last();
   worker.say({ kind: 'loaded' });
-  page.connect(SERIAL, '');
+  page.connect(SERIAL, MACHINE);
   const stopped = page.emergencyStop();
   const [id = 0] = stops(worker);
   expect(id).toBeGreaterThan(0);
@@ -167,7 +169,7 @@ test('a print that ends in an error has stopped, though the board is ready', () 
 
 test('a print that ends in an error before the first snapshot has stopped, too', async () => {
   const worker = connected();
-  const begun = page.print(new Blob(), []);
+  const begun = page.print(new Blob(), FACTS, []);
   const asked = worker.sent.find((message) => message.kind === 'print');
   if (asked?.kind !== 'print') throw new Error('no print was asked for');
   worker.say({ kind: 'answer', id: asked.id, trouble: null });

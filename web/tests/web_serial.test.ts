@@ -1,5 +1,6 @@
 // A serial port as a transport: errors on the line are survived, an unplugged device is told once.
 import { expect, test, vi } from 'vitest';
+import { NO_LINE_ERRORS } from '../src/transport/transport';
 import { find, identify, openSerial } from '../src/transport/web_serial';
 
 type Step = number[] | DOMException | 'unplug';
@@ -59,22 +60,33 @@ class ScriptedPort extends EventTarget {
 const asPort = (port: ScriptedPort): SerialPort => port as unknown as SerialPort;
 const framing = () => new DOMException('framing', 'FramingError');
 
-test('reads on over errors of the line and counts them', async () => {
-  const port = new ScriptedPort([
-    [1],
-    framing(),
-    [2, 3],
-    new DOMException('overrun', 'BufferOverrunError'),
-    [4],
-  ]);
+test.each([
+  ['BreakError', 'break'],
+  ['FramingError', 'framing'],
+  ['ParityError', 'parity'],
+  ['BufferOverrunError', 'overrun'],
+  ['UnknownError', 'system'],
+] as const)('reads on over a %s and counts it', async (name, kind) => {
+  const error = () => new DOMException('on the line', name);
+  const port = new ScriptedPort([[1], error(), [2, 3], error(), [4]]);
   const transport = await openSerial(asPort(port), 250_000);
   const reader = transport.readable.getReader();
   const got: number[] = [];
   while (got.length < 4) got.push(...((await reader.read()).value ?? []));
   expect(got).toEqual([1, 2, 3, 4]);
-  expect(transport.lineErrors()).toBe(2);
+  expect(transport.lineErrors()).toEqual({ ...NO_LINE_ERRORS, [kind]: 2 });
   await transport.close();
   expect(port.closed).toBe(true);
+});
+
+test('an error that no new stream follows is a loss, not an error of the line', async () => {
+  const gone = new DOMException('gone', 'NetworkError');
+  const transport = await openSerial(asPort(new ScriptedPort([[1], gone])), 250_000);
+  const reader = transport.readable.getReader();
+  await reader.read();
+  expect((await reader.read()).done).toBe(true);
+  expect((await transport.lost).code).toBe('unplugged');
+  expect(transport.lineErrors()).toEqual(NO_LINE_ERRORS);
 });
 
 test('an unplugged device is lost', async () => {

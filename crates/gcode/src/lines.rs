@@ -60,6 +60,11 @@ impl Lines {
         self.buffer.len() - self.start
     }
 
+    /// The number of the line that comes next.
+    pub const fn next_number(&self) -> LineNumber {
+        LineNumber(self.count.saturating_add(1))
+    }
+
     /// Says that nothing follows: what is left is the last line.
     pub fn end(&mut self) {
         self.ended = true;

@@ -51,6 +51,9 @@ const ALL_STOPPED: &str =
 /// The host found it before or while printing and shut the board down.
 const STOPPED_BY_HOST: &str =
     "The board was told to stop: motors do not move and heaters are off. The print cannot go on from here.";
+/// The board or the host stopped it, whoever saw it first.
+const STOPPED: &str =
+    "Everything was stopped: motors do not move and heaters are off. The print cannot go on from here.";
 /// Refused before anything happened.
 const NOTHING_MOVED: &str = "Nothing was sent to the printer: it did not move and no heater was switched on.";
 /// One command refused in a running session.
@@ -62,9 +65,14 @@ const AXIS_STOPPED: &str =
 /// A job that ran has come to its end.
 const JOB_ENDED: &str = "The print has ended: the moves before that place were made, the motors stand still, the heaters \
                          and the fan are off.";
+/// The board holds its motion.
+const HELD: &str = "The head rests on its path, no step was lost and the position is known. The board goes \
+                    on watching the heaters; those that it has lowered to stand-by are heated again when you resume. \
+                    Nothing goes on by itself.";
 /// Contact is gone, so nothing can be claimed but what the board does by itself.
-const ON_ITS_OWN: &str = "The printer is on its own: its board switches the heaters off within 3 seconds without \
-                          orders and stops when its queue of moves is empty. It may have lost its position.";
+const ON_ITS_OWN: &str = "The printer is on its own: after a few seconds without orders its board switches the \
+                          heaters off, or keeps them at stand-by for a while and then switches them off. Its motion \
+                          comes to rest; it may have lost its position.";
 
 catalogue! {
     SensorBelowMin, "sensor-below-min":
@@ -74,10 +82,10 @@ catalogue! {
         "A temperature sensor reads above its max_temp: its wires touch, or the heater cannot be switched off", STOPPED_BY_HOST,
         "If anything still gets hotter, cut the printer's mains power now. Then check the sensor's cable and the heater's output. Restart the board only when it is cold.";
     HeaterNotHeating, "heater-not-heating":
-        "A heater was switched on but did not get warmer", STOPPED_BY_HOST,
+        "A heater was switched on but did not get warmer", STOPPED,
         "Check that the heater is connected and powered, and that its sensor sits firmly in the heater block or bed. Then restart the board.";
     HeaterDrifted, "heater-drifted":
-        "A heater does not reach or hold its temperature although it is being heated", STOPPED_BY_HOST,
+        "A heater does not reach or hold its temperature although it is being heated", STOPPED,
         "Check that the sensor has not come loose, that the heater's wires are sound, and that no fan blows at the block. Then restart the board.";
     TargetOutOfRange, "target-out-of-range":
         "A temperature outside the heater's limits was asked for", REFUSED,
@@ -207,6 +215,18 @@ catalogue! {
     BoardShutdown, "board-shutdown":
         "The board stopped for a reason of its own", ALL_STOPPED,
         "Deal with the reason it gives, restart the board and home.";
+    HeldHostAway, "held-host-away":
+        "The computer did not reach the printer in time, so the board brought its motion to rest", HELD,
+        "Keep the page open and the computer awake. Look at the print, then resume it or cancel it.";
+    HeldQueueDry, "held-queue-dry":
+        "Moves did not reach the printer in time, so the board brought its motion to rest", HELD,
+        "Close other heavy programs, connect without a hub. Look at the print, then resume it or cancel it.";
+    HeldForHost, "held-for-host":
+        "The program that was printing went away, and the board holds the print", HELD,
+        "Look at the print, then resume it or cancel it.";
+    ContinuationRefused, "continuation-refused":
+        "The print cannot be taken up with its next step", HELD,
+        "Restart the board, home, and start again from a line or layer of the file.";
     BusyPrinting, "busy-printing":
         "That cannot be done while a print is running", REFUSED,
         "Pause or cancel the print first.";
@@ -235,7 +255,9 @@ impl From<ShutdownReason> for ErrorCode {
             R::TimerTooClose => Self::OrdersTooLate,
             R::TimerInPast | R::StepperTooFarInPast => Self::BoardTooSlow,
             R::MissedOutput => Self::HeaterUnattended,
-            R::AdcOutOfRange => Self::BoardSensorRange,
+            R::AdcOutOfRange | R::HeaterSensor => Self::BoardSensorRange,
+            R::HeaterNotHeating => Self::HeaterNotHeating,
+            R::HeaterDrifted => Self::HeaterDrifted,
             R::AlreadyConfigured => Self::ConfigMismatch,
             R::OutOfObjects => Self::BoardTooSmall,
             R::MoveQueueOverflow => Self::QueueOverflow,
@@ -251,7 +273,10 @@ impl From<ShutdownReason> for ErrorCode {
             | R::InvalidPwm
             | R::InvalidAdcTiming
             | R::InvalidTrsync
-            | R::InvalidEndstop => Self::ProtocolFault,
+            | R::InvalidEndstop
+            | R::InvalidMotion
+            | R::MotionNotHeld
+            | R::InvalidHeater => Self::ProtocolFault,
         }
     }
 }

@@ -167,6 +167,7 @@ mod tests {
             build_versions: "rustc".to_owned(),
             constants: vec![("CLOCK_FREQ".to_owned(), Constant::Number(12e6)), text("MCU", "rp2040")],
             pins: vec![("gpio0".to_owned(), 0, 30)],
+            ..Description::default()
         }
     }
 

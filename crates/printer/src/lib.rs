@@ -9,6 +9,7 @@ pub mod config;
 pub mod error;
 pub mod heater;
 pub mod identify;
+pub mod journal;
 pub mod link;
 pub mod machine;
 pub mod move_queue;

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 use units::Ticks;
 
-use crate::link::MOTION_LANES_MAX;
+use crate::link::{Clocks, MOTION_LANES_MAX};
 
 /// Entries that motion leaves free, so that a heater or a fan never waits behind a full queue of steps.
 pub const MOVE_ENTRIES_RESERVED_MAX: usize = 16;
@@ -71,9 +71,11 @@ impl MoveQueue {
         self.taken += 1;
     }
 
-    /// Frees what has been executed by `clock`.
-    pub fn release(&mut self, clock: Ticks) {
-        for row in self.motion.iter_mut().chain([&mut self.other]) {
+    /// Frees what has been executed by now: steps by the motion clock, everything else by the hardware clock.
+    pub fn release(&mut self, clocks: impl Into<Clocks>) {
+        let clocks = clocks.into();
+        let motion = self.motion.iter_mut().map(|row| (row, clocks.motion));
+        for (row, clock) in motion.chain([(&mut self.other, clocks.hardware)]) {
             while row.front().is_some_and(|&end| end.0.saturating_add(self.margin.0) <= clock.0) {
                 row.pop_front();
                 self.taken -= 1;
@@ -81,10 +83,14 @@ impl MoveQueue {
         }
     }
 
-    /// The clock at which the next entry comes free.
-    pub fn next_release(&self) -> Option<Ticks> {
-        let next = self.motion.iter().chain([&self.other]).filter_map(|row| row.front()).min()?;
-        Some(Ticks(next.0.saturating_add(self.margin.0)))
+    /// How long until the next entry comes free, as far as that can be said.
+    pub fn next_release(&self, clocks: impl Into<Clocks>) -> Option<Ticks> {
+        let clocks = clocks.into();
+        let free_at = |end: &Ticks| Ticks(end.0.saturating_add(self.margin.0));
+        let motion = self.motion.iter().filter_map(|row| row.front()).min();
+        let motion = motion.and_then(|end| clocks.until_motion(free_at(end)));
+        let other = self.other.front().map(|end| free_at(end).saturating_sub(clocks.hardware));
+        motion.into_iter().chain(other).min()
     }
 
     /// The board dropped the entries of one motion lane: its stepper was stopped by a trigger.
@@ -112,13 +118,26 @@ mod tests {
         queue.take_motion(0, Ticks(100));
         queue.take_motion(1, Ticks(50));
         queue.take_other(Ticks(70));
-        assert_eq!((queue.taken(), queue.next_release()), (3, Some(Ticks(60))));
+        assert_eq!((queue.taken(), queue.next_release(Ticks(0))), (3, Some(Ticks(60))));
         queue.release(Ticks(59));
         assert_eq!(queue.taken(), 3);
         queue.release(Ticks(60));
-        assert_eq!((queue.taken(), queue.next_release()), (2, Some(Ticks(80))));
+        assert_eq!((queue.taken(), queue.next_release(Ticks(60))), (2, Some(Ticks(20))));
         queue.release(Ticks(1000));
-        assert_eq!((queue.taken(), queue.next_release()), (0, None));
+        assert_eq!((queue.taken(), queue.next_release(Ticks(0))), (0, None));
+    }
+
+    #[test]
+    fn steps_go_by_the_motion_clock_and_outputs_by_the_other() {
+        let mut queue = MoveQueue::new(64, Ticks(10));
+        queue.take_motion(0, Ticks(100));
+        queue.take_other(Ticks(100));
+        let held = Clocks { hardware: Ticks(105), motion: Ticks(40), is_steady: false };
+        assert_eq!(queue.next_release(held), Some(Ticks(5)));
+        queue.release(Clocks { hardware: Ticks(200), ..held });
+        assert_eq!((queue.taken(), queue.next_release(held)), (1, None));
+        let runs = Clocks { hardware: Ticks(200), motion: Ticks(50), is_steady: true };
+        assert_eq!(queue.next_release(runs), Some(Ticks(60)));
     }
 
     #[test]
@@ -140,7 +159,7 @@ mod tests {
         queue.forget_motion(0);
         assert_eq!(queue.taken(), 1);
         queue.forget_all();
-        assert_eq!((queue.taken(), queue.next_release()), (0, None));
+        assert_eq!((queue.taken(), queue.next_release(Ticks(0))), (0, None));
     }
 
     proptest! {

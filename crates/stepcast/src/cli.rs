@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use virtual_printer::{BoardProfile, FAULT_ITEMS, Faults};
 
+use crate::campaign::Scenario;
+
 /// Checks, plans and simulates G-code for a printer, and serves a virtual one.
 #[derive(Debug, Parser)]
 #[command(
@@ -26,6 +28,8 @@ pub(crate) enum CommandLine {
     Plan(PlanArgs),
     /// Print a G-code file on the virtual printer, in virtual time, and measure what its pulses draw
     Simulate(SimulateArgs),
+    /// Let things go wrong at random moments of many short prints, and check that every promise is kept
+    Campaign(CampaignArgs),
     /// Serve the virtual printer on a pseudo-terminal, in real time
     VirtualPrinter(VirtualPrinterArgs),
     /// Write a completion script for a shell to stdout
@@ -69,6 +73,10 @@ pub(crate) enum Board {
     Rp2040,
     /// STM32F103 on a UART, with little memory
     Stm32f103,
+    /// The same RP2040 with plain Klipper firmware
+    Rp2040Plain,
+    /// The same STM32F103 with plain Klipper firmware
+    Stm32f103Plain,
 }
 
 impl Board {
@@ -77,6 +85,8 @@ impl Board {
         match self {
             Self::Rp2040 => BoardProfile::rp2040(),
             Self::Stm32f103 => BoardProfile::stm32f103(),
+            Self::Rp2040Plain => BoardProfile::rp2040().plain(),
+            Self::Stm32f103Plain => BoardProfile::stm32f103().plain(),
         }
     }
 }
@@ -128,6 +138,38 @@ pub(crate) struct SimulateArgs {
     /// Print although lines have commands that are not known
     #[arg(long)]
     pub(crate) confirm_all: bool,
+    /// Resume a print that the board holds because its host was held up, as a user would; it ends there otherwise
+    #[arg(long)]
+    pub(crate) confirm_holds: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct CampaignArgs {
+    /// How many prints of each scenario
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) runs: u32,
+    /// What all chance follows from; run I of a campaign is the only one of a campaign with the seed S + I
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// What goes wrong; all scenarios when left out
+    #[arg(long = "scenario", value_name = "NAME", value_enum, value_delimiter = ',')]
+    pub(crate) scenarios: Vec<Scenario>,
+    /// A G-code file of which windows are printed, besides generated ones; the two samples when left out. May be given
+    /// several times
+    #[arg(long = "file", value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// The machine; a usual one when left out
+    #[arg(long, value_name = "PRINTER.CFG")]
+    pub(crate) config: Option<PathBuf>,
+    /// Write the result as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write the G-code of prints that break a promise into this folder, by their seed
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) save: Option<PathBuf>,
+    /// How many prints run at the same time
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub(crate) jobs: u16,
 }
 
 #[derive(Args, Debug)]

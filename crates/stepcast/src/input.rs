@@ -8,6 +8,7 @@ use std::{
     io::{self, Read},
     path::{Path, PathBuf},
     rc::Rc,
+    sync::Arc,
 };
 
 use flate2::read::MultiGzDecoder;
@@ -115,6 +116,20 @@ impl Input {
     /// How many of these bytes have been read.
     pub(crate) fn position(&self) -> u64 {
         self.read.get()
+    }
+
+    /// G-code from memory, under a name for messages.
+    pub(crate) fn memory(name: &str, gcode: Arc<[u8]>) -> Self {
+        Self {
+            path: PathBuf::from(name),
+            size: gcode.len() as u64,
+            reader: Box::new(io::Cursor::new(gcode)),
+            compressed: false,
+            head: Vec::new(),
+            buffer: Vec::new(),
+            read: Rc::default(),
+            given_out: 0,
+        }
     }
 
     fn fill_head(&mut self) -> Result<(), PrinterError> {

@@ -2,6 +2,7 @@
 //!
 //! A thin shell: files, terminals and exit statuses are here, everything else is in the crates it stands on.
 
+mod campaign;
 mod check;
 mod cli;
 mod config_file;
@@ -24,6 +25,7 @@ fn main() -> ExitCode {
         CommandLine::Check(args) => (check::run(args), args.json),
         CommandLine::Plan(args) => (plan::run(args), args.json),
         CommandLine::Simulate(args) => (simulate::run(args), args.json),
+        CommandLine::Campaign(args) => (campaign::run(args), args.json),
         CommandLine::VirtualPrinter(args) => (virtual_printer::run(args), false),
         CommandLine::Completions { shell } => (completions(*shell), false),
     };

@@ -19,6 +19,11 @@ pub const SEQUENCE_MASK: u8 = 0x0f;
 
 static CRC: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_MCRF4XX);
 
+/// A block's second byte.
+pub(crate) const fn sequence_byte(sequence: u8) -> u8 {
+    SEQUENCE_TAG | (sequence & SEQUENCE_MASK)
+}
+
 /// A whole block, ready to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
@@ -35,7 +40,7 @@ impl Block {
         let len = payload.len() + BLOCK_BYTES_MIN;
         let mut bytes = [0; BLOCK_BYTES_MAX];
         bytes[0] = len as u8;
-        bytes[1] = SEQUENCE_TAG | (sequence & SEQUENCE_MASK);
+        bytes[1] = sequence_byte(sequence);
         bytes[2..len - 3].copy_from_slice(payload);
         let crc = CRC.checksum(&bytes[..len - 3]);
         bytes[len - 3..len - 1].copy_from_slice(&crc.to_be_bytes());

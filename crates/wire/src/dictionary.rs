@@ -14,10 +14,17 @@ use alloc::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    check::BlockCheck,
     messages::{Command, CommandKind, DecodeError, MessageSpec, Response, ResponseKind, decode_id},
-    shutdown::ShutdownReason,
     vlq::{self, Sink},
 };
+
+mod description;
+
+#[cfg(test)]
+mod tests;
+
+pub use description::{BLOCK_CHECK, BLOCK_CHECK_VERSION, BOARD_HEATERS, Description, MOTION_CLOCK};
 
 /// The largest dictionary that is accepted once unpacked: real ones are below 64 KiB.
 pub const DICTIONARY_BYTES_MAX: usize = 1 << 20;
@@ -80,58 +87,6 @@ struct Json {
     output: BTreeMap<String, i32>,
     #[serde(default)]
     enumerations: BTreeMap<String, BTreeMap<String, EnumerationValue>>,
-}
-
-/// What a board says of itself, apart from the messages, which are the same on all of ours.
-#[derive(Clone, Debug, Default)]
-pub struct Description {
-    /// The firmware's version.
-    pub version: String,
-    /// Tool versions.
-    pub build_versions: String,
-    /// Constants such as `CLOCK_FREQ`.
-    pub constants: Vec<(String, Constant)>,
-    /// Pin names: the first name of a row, its value, how many there are.
-    pub pins: Vec<(String, u8, u8)>,
-}
-
-impl Description {
-    /// The dictionary as JSON.
-    pub fn json(&self) -> String {
-        let formats = |specs: &mut dyn Iterator<Item = MessageSpec>| -> BTreeMap<String, i32> {
-            specs.map(|spec| (format_of(&spec), i32::from(spec.id))).collect()
-        };
-        let pins = self.pins.iter().map(|(name, first, count)| {
-            let value = match count {
-                1 => EnumerationValue::One(i64::from(*first)),
-                _ => EnumerationValue::Row([i64::from(*first), i64::from(*count)]),
-            };
-            (name.clone(), value)
-        });
-        let reasons = ShutdownReason::ALL
-            .iter()
-            .map(|&reason| (reason.text().to_owned(), EnumerationValue::One(i64::from(reason as u16))));
-        let json = Json {
-            version: self.version.clone(),
-            build_versions: self.build_versions.clone(),
-            config: self.constants.iter().cloned().collect(),
-            commands: formats(&mut CommandKind::ALL.iter().map(|kind| kind.spec())),
-            responses: formats(&mut ResponseKind::ALL.iter().map(|kind| kind.spec())),
-            output: BTreeMap::new(),
-            enumerations: [
-                ("pin".to_owned(), pins.collect()),
-                ("static_string_id".to_owned(), reasons.collect()),
-            ]
-            .into(),
-        };
-        serde_json::to_string(&json).expect("maps of strings and numbers are always JSON")
-    }
-
-    /// The dictionary as it travels.
-    pub fn compressed(&self) -> Vec<u8> {
-        const LEVEL: u8 = 9;
-        miniz_oxide::deflate::compress_to_vec_zlib(self.json().as_bytes(), LEVEL)
-    }
 }
 
 fn format_of(spec: &MessageSpec) -> String {
@@ -213,6 +168,17 @@ impl Format {
         }
         Some(())
     }
+}
+
+/// How blocks are checked between a host and a board that knows the block check.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BlockChecks {
+    /// The check of blocks to the board.
+    pub to_board: BlockCheck,
+    /// The check of blocks from it.
+    pub from_board: BlockCheck,
+    /// The payload by which a board says, without a check, that it has just started and checks no more.
+    pub starting: Vec<u8>,
 }
 
 /// A message from a board, as a host sees it.
@@ -374,6 +340,23 @@ impl Dictionary {
         })
     }
 
+    /// The checks of blocks to the board and from it, where the board knows the block check.
+    pub fn block_checks(&self) -> Option<BlockChecks> {
+        if self.number(BLOCK_CHECK) != Some(BLOCK_CHECK_VERSION) {
+            return None;
+        }
+        let response = |wanted: ResponseKind| {
+            self.incoming.iter().find(|(_, incoming)| incoming.known == Some(wanted)).map(|(&id, _)| id)
+        };
+        let mut starting = Vec::new();
+        vlq::encode(i32::from(response(ResponseKind::Starting)?), &mut starting);
+        Some(BlockChecks {
+            to_board: BlockCheck::new(self.command_id(CommandKind::BlockCheck).ok()?),
+            from_board: BlockCheck::new(response(ResponseKind::BlockChecked)?),
+            starting,
+        })
+    }
+
     /// Appends a command as this board numbers it.
     pub fn encode(&self, command: &Command<'_>, out: &mut impl Sink) -> Result<(), DictionaryError> {
         let id = self.command_id(command.kind())?;
@@ -398,99 +381,4 @@ impl Dictionary {
 fn split_number(name: &str) -> Option<(&str, i64)> {
     let root = name.trim_end_matches(|c: char| c.is_ascii_digit());
     Some((root, name[root.len()..].parse().ok()?))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use alloc::vec;
-
-    fn ours() -> Dictionary {
-        let description = Description {
-            version: "v1".into(),
-            build_versions: "rustc".into(),
-            constants: vec![
-                ("CLOCK_FREQ".into(), Constant::Number(12e6)),
-                ("MCU".into(), Constant::Text("rp2040".into())),
-            ],
-            pins: vec![("gpio0".into(), 0, 30), ("LED".into(), 40, 1)],
-        };
-        Dictionary::parse(&description.compressed()).unwrap()
-    }
-
-    #[test]
-    fn a_host_understands_what_our_board_says_of_itself() {
-        let dictionary = ours();
-        assert_eq!(dictionary.number("CLOCK_FREQ"), Some(12e6));
-        assert_eq!(dictionary.text("MCU").as_deref(), Some("rp2040"));
-        assert_eq!(dictionary.pin("gpio0"), Some(0));
-        assert_eq!(dictionary.pin("gpio29"), Some(29));
-        assert_eq!(dictionary.pin("gpio30"), None);
-        assert_eq!(dictionary.pin("LED"), Some(40));
-        assert_eq!(dictionary.enumeration_name("static_string_id", 3), Some("Timer too close"));
-        assert_eq!(dictionary.require(CommandKind::ALL), Ok(()));
-    }
-
-    #[test]
-    fn commands_and_answers_pass() {
-        let dictionary = ours();
-        let command = Command::QueueStep { oid: 1, interval: 2, count: 3, add: -4 };
-        let mut bytes = vec![];
-        dictionary.encode(&command, &mut bytes).unwrap();
-        assert_eq!(Command::decode(&mut &bytes[..]), Ok(command));
-        bytes.clear();
-        let answer = Response::Clock { clock: 99 };
-        answer.encode(&mut bytes);
-        assert_eq!(dictionary.decode(&mut &bytes[..]), Ok(Received::Known(answer)));
-    }
-
-    #[test]
-    fn a_board_with_other_fields_is_told_apart_and_named() {
-        let json = r#"{"commands": {"identify offset=%u count=%c": 1, "queue_step oid=%c interval=%u count=%hu": 9},
-            "responses": {"identify_response offset=%u data=%.*s": 0, "novelty a=%u b=%*s": 70},
-            "output": {"debug %u of %hu: %.*s": 71}, "config": {"CLOCK_FREQ": "72000000"}}"#;
-        let dictionary =
-            Dictionary::parse(&miniz_oxide::deflate::compress_to_vec_zlib(json.as_bytes(), 6)).unwrap();
-        assert_eq!(dictionary.number("CLOCK_FREQ"), Some(72e6));
-        assert!(!dictionary.supports(CommandKind::QueueStep));
-        let error = dictionary.require(&[CommandKind::QueueStep]).unwrap_err().to_string();
-        assert!(error.contains("add=%hi") && error.contains("it has"), "{error}");
-        // Messages that only this board has are stepped over, so that those behind them in the block are read.
-        let bytes = vec![70, 5, 2, 0xff, 0xff, 71, 1, 2, 1, b'x', 0, 3, 1, 7];
-        let mut rest = &bytes[..];
-        assert_eq!(dictionary.decode(&mut rest), Ok(Received::Other("novelty a=%u b=%*s")));
-        assert_eq!(dictionary.decode(&mut rest), Ok(Received::Other("debug %u of %hu: %.*s")));
-        assert_eq!(
-            dictionary.decode(&mut rest),
-            Ok(Received::Known(Response::IdentifyResponse { offset: 3, data: &[7] }))
-        );
-    }
-
-    #[test]
-    fn rows_without_end_are_no_harm() {
-        let json = r#"{"enumerations": {"pin": {"PA0": [9223372036854775807, 9223372036854775807],
-            "PB9223372036854775807": [1, 9223372036854775807], "PC3": [-5, -9223372036854775808]}}}"#;
-        let dictionary =
-            Dictionary::parse(&miniz_oxide::deflate::compress_to_vec_zlib(json.as_bytes(), 6)).unwrap();
-        assert_eq!(dictionary.enumeration("pin", "PA7"), None);
-        assert_eq!(dictionary.enumeration("pin", "PA9223372036854775806"), None);
-        assert_eq!(dictionary.enumeration("pin", "PB9"), None);
-        assert_eq!(dictionary.enumeration("pin", "PC4"), None);
-    }
-
-    #[test]
-    fn damaged_dictionaries_are_errors() {
-        assert!(matches!(Dictionary::parse(b"nonsense"), Err(DictionaryError::Compression(_))));
-        let not_json = miniz_oxide::deflate::compress_to_vec_zlib(b"[]x", 6);
-        assert!(matches!(Dictionary::parse(&not_json), Err(DictionaryError::Json(_))));
-        let bomb = miniz_oxide::deflate::compress_to_vec_zlib(&vec![b' '; DICTIONARY_BYTES_MAX + 1], 6);
-        assert!(matches!(Dictionary::parse(&bomb), Err(DictionaryError::Compression(_))));
-    }
-
-    #[test]
-    fn the_bootstrap_knows_identify_and_nothing_else() {
-        let dictionary = Dictionary::bootstrap();
-        assert!(dictionary.supports(CommandKind::Identify));
-        assert!(!dictionary.supports(CommandKind::QueueStep));
-    }
 }

@@ -6,6 +6,9 @@
 
 use crate::vlq::{self, Sink};
 
+#[cfg(test)]
+mod tests;
+
 /// Why a message could not be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DecodeError {
@@ -285,6 +288,87 @@ messages! {
     QueueDigitalOut "queue_digital_out" { oid: u8, clock: u32, on_ticks: u32 }
     /// Sets an output now.
     UpdateDigitalOut "update_digital_out" { oid: u8, value: u8 }
+
+    // The motion clock, an extension of ours (docs/motion-clock.md). What plain boards also have stays before it, so
+    // that it keeps its numbers.
+    /// Renews the lease on motion: steps are queued up to the motion clock `covered`, the host lives until the clock
+    /// `alive`; motion comes to rest by a ramp of `ramp` ticks when either runs out.
+    MotionLease "motion_lease" { covered: u32, alive: u32, ramp: u32 }
+    /// The motion clock at which all that is queued has come to rest by itself: there the lease ends.
+    MotionEnd "motion_end" { clock: u32 }
+    /// Slows the motion clock to a stop.
+    MotionHold "motion_hold" { ramp: u32 }
+    /// Speeds the motion clock up again.
+    MotionResume "motion_resume" { ramp: u32 }
+    /// The rate of the motion clock while it is not held, in 1/4096 of the clock's.
+    MotionRate "motion_rate" { rate: u16, ramp: u32 }
+    /// Asks for the state of the motion clock.
+    MotionGetState "motion_get_state" {}
+    /// While held: drops all queued steps and tied output changes; every stepper tells how far it came.
+    MotionDrop "motion_drop" {}
+    /// Begins a new count of rows on every stepper.
+    MotionJob "motion_job" { id: u32 }
+    /// An output's queued changes follow the motion clock.
+    MotionTie "motion_tie" { oid: u8 }
+    /// Asks how far a stepper has come in its rows.
+    StepperGetQueue "stepper_get_queue" { oid: u8 }
+
+    // Heaters that the board regulates, an extension of ours (docs/board-heaters.md, with all units).
+    /// A heater: an analog input, sampled with so many readings a sum, that regulates an output.
+    ConfigHeater "config_heater" {
+        oid: u8, adc_oid: u8, out_oid: u8, sample_count: u8, max_power: u16, smooth: u16
+    }
+    /// The next point of the sensor's curve.
+    HeaterPoint "heater_point" { oid: u8, sum: u16, temperature: i32 }
+    /// Regulates by PID.
+    HeaterPid "heater_pid" { oid: u8, kp: u32, ki: u32, kd: u32 }
+    /// Regulates on and off, `delta` around the target.
+    HeaterWatermark "heater_watermark" { oid: u8, delta: u32 }
+    /// What a sound heater does.
+    HeaterCheck "heater_check" { oid: u8, max_error: u32, gain_time: u32, hysteresis: u32, gain: u32 }
+    /// A target, and what becomes of it when the host falls silent.
+    HeaterSet "heater_set" { oid: u8, target: i32, standby: i32, standby_s: u16 }
+    /// The host lives until the clock `alive`.
+    HeaterLease "heater_lease" { alive: u32 }
+    /// Asks for the state of a heater.
+    HeaterGetState "heater_get_state" { oid: u8 }
+
+    // The block check, an extension of ours (docs/block-check.md).
+    /// The CRC-32 over all of the block before it; from the first right one on the board takes no block without.
+    BlockCheck "block_check" { crc: u32 }
+}
+
+/// What plain Klipper firmware lacks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extension {
+    /// The motion clock: hold, resume and lease.
+    MotionClock,
+    /// Heaters that the board regulates.
+    Heaters,
+    /// The check over whole blocks.
+    BlockCheck,
+}
+
+impl CommandKind {
+    /// The extension that this command belongs to; `None` for those of plain Klipper firmware.
+    pub const fn extension(self) -> Option<Extension> {
+        match self {
+            Self::BlockCheck => Some(Extension::BlockCheck),
+            _ if self.is_heater() => Some(Extension::Heaters),
+            _ if self as u16 >= Self::MotionLease as u16 => Some(Extension::MotionClock),
+            _ => None,
+        }
+    }
+
+    /// Whether a board with plain Klipper firmware lacks this command.
+    pub const fn is_extension(self) -> bool {
+        self.extension().is_some()
+    }
+
+    /// Whether it belongs to the heaters that a board regulates.
+    pub const fn is_heater(self) -> bool {
+        self as u16 >= Self::ConfigHeater as u16 && self as u16 <= Self::HeaterGetState as u16
+    }
 }
 
 messages! {
@@ -315,62 +399,33 @@ messages! {
     IsShutdown "is_shutdown" { static_string_id: u16 }
     /// The firmware has just started.
     Starting "starting" {}
+
+    // The motion clock, as above.
+    /// At the clock `clock` the motion clock stood at `motion` and ran at `rate`/4096; why it is or will be held.
+    MotionState "motion_state" { clock: u32, motion: u32, rate: u16, state: u8, reason: u8 }
+    /// How far a stepper has come in its job: rows, steps left in the current row, the motion clock and direction of
+    /// the next step, position, and the check over all rows received.
+    StepperQueue "stepper_queue" {
+        oid: u8, job: u32, received: u32, done: u32, left: u16, next: u32, dir: u8, pos: i32, crc: u32
+    }
+
+    // Heaters, as above.
+    /// What a heater read at `clock`, what it is held at, its power, and why.
+    HeaterState "heater_state" { oid: u8, clock: u32, temperature: i32, target: i32, power: u16, state: u8 }
+
+    // The block check, as above.
+    /// The CRC-32 over all of the block before it.
+    BlockChecked "block_checked" { crc: u32 }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use alloc::{vec, vec::Vec};
-    use proptest::prelude::*;
-
-    #[test]
-    fn numbers_are_unique_and_the_fixed_ones_are_right() {
-        let commands = CommandKind::ALL.iter().map(|kind| kind.spec().id);
-        let mut ids: Vec<u16> = commands.chain(ResponseKind::ALL.iter().map(|kind| kind.spec().id)).collect();
-        ids.sort_unstable();
-        let all = ids.len();
-        ids.dedup();
-        assert_eq!(ids.len(), all);
-        assert!(ids.iter().all(|&id| id < 96), "all numbers travel as one byte");
-        assert_eq!(CommandKind::Identify.spec().id, 1);
-        assert_eq!(ResponseKind::IdentifyResponse.spec().id, 0);
-    }
-
-    #[test]
-    fn a_value_beyond_its_type_is_an_error() {
-        let mut bytes = Vec::new();
-        vlq::encode(i32::from(CommandKind::AllocateOids.spec().id), &mut bytes);
-        vlq::encode(256, &mut bytes);
-        assert_eq!(Command::decode(&mut &bytes[..]), Err(DecodeError::OutOfRange));
-    }
-
-    #[test]
-    fn an_unknown_number_is_an_error() {
-        let mut bytes = Vec::new();
-        vlq::encode(60, &mut bytes);
-        assert_eq!(Command::decode(&mut &bytes[..]), Err(DecodeError::UnknownId(60)));
-        assert_eq!(Response::decode(&mut &bytes[..]), Err(DecodeError::UnknownId(60)));
-    }
-
-    proptest! {
-        #[test]
-        fn messages_come_back_as_they_went(oid: u8, interval: u32, count: u16, add: i16, data: Vec<u8>) {
-            let step = Command::QueueStep { oid, interval, count, add };
-            let reply = Response::AnalogInState { oid, next_clock: interval, values: &data };
-            let mut bytes = vec![];
-            prop_assert!(step.encode(&mut bytes));
-            prop_assert_eq!(Command::decode(&mut &bytes[..]), Ok(step));
-            bytes.clear();
-            prop_assert!(reply.encode(&mut bytes));
-            prop_assert_eq!(Response::decode(&mut &bytes[..]), Ok(reply));
-        }
-
-        #[test]
-        fn garbage_is_an_error_and_never_a_panic(bytes: Vec<u8>) {
-            let mut rest = &bytes[..];
-            while Command::decode(&mut rest).is_ok() && !rest.is_empty() {}
-            let mut rest = &bytes[..];
-            while Response::decode(&mut rest).is_ok() && !rest.is_empty() {}
+impl ResponseKind {
+    /// The extension that this message belongs to; `None` for those of plain Klipper firmware.
+    pub const fn extension(self) -> Option<Extension> {
+        match self {
+            Self::BlockChecked => Some(Extension::BlockCheck),
+            Self::HeaterState => Some(Extension::Heaters),
+            _ if self as u16 >= Self::MotionState as u16 => Some(Extension::MotionClock),
+            _ => None,
         }
     }
 }

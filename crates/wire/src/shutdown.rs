@@ -70,4 +70,16 @@ reasons! {
     InvalidTrsync = 23, "Invalid trsync parameters";
     /// The sampling commands of an endstop make no sense.
     InvalidEndstop = 24, "Invalid endstop sampling parameters";
+    /// A ramp, rate or tie that the motion clock cannot have.
+    InvalidMotion = 25, "Invalid motion clock parameters";
+    /// `motion_drop` while the motion clock is not held.
+    MotionNotHeld = 26, "Motion clock is not held";
+    /// Commands of a heater that make no sense, or that it does not allow.
+    InvalidHeater = 27, "Invalid heater parameters";
+    /// A heater's sensor left its curve.
+    HeaterSensor = 28, "Heater sensor out of range";
+    /// A heater that is on its way does not warm.
+    HeaterNotHeating = 29, "Heater does not get warmer";
+    /// A heater lost its temperature.
+    HeaterDrifted = 30, "Heater does not hold its temperature";
 }

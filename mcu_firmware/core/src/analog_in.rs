@@ -5,6 +5,7 @@ use wire::{Response, ShutdownReason};
 
 use crate::{
     board::{AnalogSample, Board, Pin},
+    heater::Sum,
     objects::After,
 };
 
@@ -35,6 +36,10 @@ pub(crate) struct AnalogIn {
     report: [u8; REPORT_BYTES_MAX],
     report_len: u8,
     pub(crate) report_pending: bool,
+    /// A heater wants every sum …
+    pub(crate) feeds_heater: bool,
+    /// … and has not taken this one.
+    fresh: Option<Sum>,
 }
 
 impl AnalogIn {
@@ -63,7 +68,14 @@ impl AnalogIn {
             report: [0; REPORT_BYTES_MAX],
             report_len: 0,
             report_pending: false,
+            feeds_heater: false,
+            fresh: None,
         }
+    }
+
+    /// Forgets all that was asked.
+    fn rest(&mut self) {
+        *self = Self { feeds_heater: self.feeds_heater, ..Self::idle(self.pin) };
     }
 
     /// Begins to sample; `false` when it was asked to stop.
@@ -74,7 +86,7 @@ impl AnalogIn {
         sampling: Sampling,
     ) -> Result<bool, ShutdownReason> {
         board.cancel_analog(self.pin);
-        *self = Self::idle(self.pin);
+        self.rest();
         if sampling.sample_count == 0 {
             return Ok(false);
         }
@@ -105,9 +117,17 @@ impl AnalogIn {
         let sum = core::mem::take(&mut self.sum);
         self.readings = 0;
         self.check_range(sum)?;
+        if self.feeds_heater {
+            self.fresh = Some(Sum { clock: self.group_clock, value: sum });
+        }
         self.group_clock = self.group_clock.wrapping_add(self.sampling.rest_ticks);
         self.store(sum);
         Ok(After::Again(self.group_clock))
+    }
+
+    /// The sum that a heater wants.
+    pub(crate) const fn take_sum(&mut self) -> Option<Sum> {
+        self.fresh.take()
     }
 
     fn check_range(&mut self, sum: u16) -> Result<(), ShutdownReason> {
@@ -149,6 +169,6 @@ impl AnalogIn {
 
     pub(crate) fn shut_down(&mut self, board: &mut impl Board) {
         board.cancel_analog(self.pin);
-        *self = Self::idle(self.pin);
+        self.rest();
     }
 }

@@ -1,7 +1,7 @@
 //! What each command does. Bad values and bad timing are returned as the reason to shut down.
 
 use units::Clock32;
-use wire::{Command, Response, ShutdownReason};
+use wire::{Command, Response, ShutdownReason, messages::Extension};
 
 use crate::{
     analog_in::{AnalogIn, Sampling},
@@ -15,8 +15,8 @@ use crate::{
     trsync::Trsync,
 };
 
-/// The most dictionary bytes in one `identify_response`, so that it fits a block whatever its offset.
-const IDENTIFY_BYTES_MAX: u8 = 50;
+/// The most dictionary bytes in one `identify_response`, so that it fits a block whatever its offset, check and all.
+const IDENTIFY_BYTES_MAX: u8 = 46;
 
 impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     pub(crate) fn dispatch(
@@ -24,6 +24,13 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         board: &mut impl Board,
         command: Command<'_>,
     ) -> Result<(), ShutdownReason> {
+        match command.kind().extension() {
+            None => {}
+            Some(Extension::Heaters) => return self.dispatch_heater(board, &command),
+            Some(Extension::MotionClock) => return self.dispatch_motion(board, &command),
+            // What a block may end in is nothing to be done, and unknown to a board without the block check.
+            Some(Extension::BlockCheck) => return Err(ShutdownReason::CommandParser),
+        }
         match command {
             Command::Identify { .. }
             | Command::GetConfig {}
@@ -164,7 +171,8 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         match command {
             Command::QueueStep { oid, interval, count, add } => {
                 let stepper = self.objects.stepper(oid)?;
-                if let Some(wake) = stepper.queue_step(board, &mut self.moves, (interval, count, add))? {
+                let row = (interval, count, add);
+                if let Some(wake) = stepper.queue_step(board, &mut self.moves, &self.hold.clock, row)? {
                     self.timers.schedule(oid, wake);
                 }
             }
@@ -224,15 +232,18 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             Command::QueryAnalogIn { .. } => self.sample(board, command),
             Command::QueueDigitalOut { oid, clock, on_ticks } => {
                 let output = self.objects.digital_out(oid)?;
-                output.queue(board.now(), &mut self.moves, OutputMove { clock, on_ticks })?;
-                let wake = output.wake();
+                output.check_free()?;
+                let change = OutputMove { clock, on_ticks };
+                output.queue(board.now(), &mut self.moves, &self.hold.clock, change)?;
+                let wake = output.wake(&self.hold.clock);
                 self.reset_output_timer(oid, wake);
                 Ok(())
             }
             Command::UpdateDigitalOut { oid, value } => {
                 let output = self.objects.digital_out(oid)?;
+                output.check_free()?;
                 output.update(board, &mut self.moves, value != 0);
-                let wake = output.wake();
+                let wake = output.wake(&self.hold.clock);
                 self.reset_output_timer(oid, wake);
                 Ok(())
             }
@@ -316,6 +327,11 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         else {
             return Ok(());
         };
+        // Another number of readings would give the heater another temperature.
+        let is_other = |count| sample_count != 0 && sample_count != count;
+        if self.heaters.fed_by(oid).is_some_and(|heater| is_other(heater.wiring.sample_count)) {
+            return Err(ShutdownReason::InvalidHeater);
+        }
         let clock = Clock32(clock);
         let sampling = Sampling {
             sample_ticks,

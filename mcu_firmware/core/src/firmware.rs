@@ -8,6 +8,8 @@ use wire::{
 
 use crate::{
     board::Board,
+    heater::Heaters,
+    hold::Hold,
     moves::MovePool,
     objects::{After, Object, Objects},
     receiver::Receiver,
@@ -47,12 +49,39 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
         self
     }
 
+    /// Without a motion clock: it is the hardware clock, and its commands do not exist.
+    #[must_use]
+    pub const fn without_motion_clock(mut self) -> Self {
+        self.core.has_motion_clock = false;
+        self
+    }
+
+    /// As a board that leaves temperature loops to its host.
+    #[must_use]
+    pub const fn without_heaters(mut self) -> Self {
+        self.core.has_heaters = false;
+        self
+    }
+
+    /// As a board that knows no check over blocks but the framing's own.
+    #[must_use]
+    pub const fn without_block_check(mut self) -> Self {
+        self.core.receiver.without_check();
+        self
+    }
+
+    /// As a board with plain Klipper firmware, which has none of these.
+    #[must_use]
+    pub const fn plain(self) -> Self {
+        self.without_motion_clock().without_heaters().without_block_check()
+    }
+
     /// Takes bytes from the host, in pieces of any size: answers and obeys.
     pub fn receive(&mut self, board: &mut impl Board, bytes: &[u8]) {
         let Self { deframer, core } = self;
         let now = board.now();
-        core.uptime.look(now);
         core.timers.look(now);
+        core.look(now);
         deframer.push(bytes, |frame| core.frame(board, frame));
     }
 
@@ -61,7 +90,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
     /// never let up are left alone for a moment after a tenth of a millisecond, so that the main loop still runs.
     ///
     /// Called from the timer interrupt on a chip, by the event loop in a simulation; and whenever bytes have been
-    /// received, since they may have started an earlier timer.
+    /// received and tasks have run, since they may have started an earlier timer.
     pub fn run_timers(&mut self, board: &mut impl Board) -> Clock32 {
         self.core.run_timers(board)
     }
@@ -77,6 +106,11 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
         self.core.has_tasks()
     }
 
+    /// The motion clock at a clock that is not before the last call; docs/motion-clock.md says how it runs.
+    pub fn motion_clock(&self, clock: Clock32) -> Clock32 {
+        self.core.hold.clock.motion(clock)
+    }
+
     /// Why the board is shut down, if it is.
     pub const fn shutdown_reason(&self) -> Option<ShutdownReason> {
         self.core.halt.reason()
@@ -86,18 +120,25 @@ impl<const OBJECTS: usize, const MOVES: usize> Firmware<OBJECTS, MOVES> {
 /// All but the deframer, whose buffer holds the block that is being obeyed.
 pub(crate) struct Core<const OBJECTS: usize, const MOVES: usize> {
     pub(crate) objects: Objects<OBJECTS>,
-    /// Timers on the hardware clock. A motion clock of its own would be a second list, for steppers and the outputs
-    /// that follow them.
+    /// All timers, on the hardware clock. Those that wait on the motion clock are set to what that means, anew each
+    /// time its rate changes; where it is out of reach they do not run.
     pub(crate) timers: Timers<OBJECTS>,
     pub(crate) moves: MovePool<MOVES>,
     pub(crate) receiver: Receiver,
     pub(crate) halt: Halt,
+    pub(crate) hold: Hold,
+    pub(crate) has_motion_clock: bool,
+    pub(crate) heaters: Heaters,
+    pub(crate) has_heaters: bool,
+    /// The host's mark of the job whose rows are counted.
+    pub(crate) job: u32,
     /// The host's mark of the configuration, once that is complete.
     pub(crate) config_crc: Option<u32>,
     pub(crate) uptime: Uptime,
     stats: Stats,
     /// When the clock has to be looked at again.
     look_at: Clock32,
+    clock: Hertz,
     late_ticks: u32,
     starting: bool,
     pub(crate) reports_pending: bool,
@@ -111,10 +152,16 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             moves: MovePool::new(),
             receiver: Receiver::new(),
             halt: Halt::new(),
+            hold: Hold::new(clock),
+            has_motion_clock: true,
+            heaters: Heaters::new(clock),
+            has_heaters: true,
+            job: 0,
             config_crc: None,
             uptime: Uptime::new(),
             stats: Stats::new(clock),
             look_at: Clock32(0),
+            clock,
             late_ticks: clock.0 / LATE_SECONDS_INVERSE,
             starting: true,
             reports_pending: false,
@@ -122,23 +169,32 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     }
 
     fn frame(&mut self, board: &mut impl Board, frame: Frame<'_>) {
-        if let Frame::Block { sequence, payload } = frame
-            && self.receiver.accept(sequence)
-        {
-            self.obey(board, payload);
+        match frame {
+            Frame::Block { sequence, payload } => {
+                if let Some(messages) = self.receiver.accept(sequence, payload) {
+                    self.obey(board, sequence, messages);
+                }
+            }
+            Frame::Garbage => self.receiver.garbage(),
         }
         self.receiver.acknowledge(board);
     }
 
     /// Obeys the messages of one block, in order.
-    fn obey(&mut self, board: &mut impl Board, mut payload: &[u8]) {
+    fn obey(&mut self, board: &mut impl Board, sequence: u8, messages: &[u8]) {
         let mut refused = false;
-        while !payload.is_empty() {
+        let mut rest = messages;
+        while !rest.is_empty() {
             // What follows a message that does not decode cannot be understood either.
-            let Ok(command) = Command::decode(&mut payload) else {
+            let Ok(command) = Command::decode(&mut rest) else {
                 self.shut_down(board, ShutdownReason::CommandParser);
                 return;
             };
+            if matches!(command, Command::BlockCheck { .. })
+                && self.receiver.met_check(sequence, messages, rest)
+            {
+                continue;
+            }
             if self.halt.reason().is_some() && !is_allowed(&command) {
                 // Once a block is enough: a block may hold many commands.
                 if !refused && let Some(refusal) = self.halt.refusal() {
@@ -165,6 +221,10 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             if now.is_before(wake) {
                 now = board.now();
                 if now.is_before(wake) {
+                    if !now.is_before(self.look_at) {
+                        self.look(now);
+                        continue;
+                    }
                     return if self.look_at.is_before(wake) { self.next_look(now) } else { wake };
                 }
                 if now.since(begin) as u32 > self.late_ticks / BUSY_PART {
@@ -176,7 +236,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
                 break;
             }
             if let Some(Object::Stepper(stepper)) = self.objects.get_mut(oid) {
-                match stepper.event(board, &mut self.moves, self.late_ticks) {
+                match stepper.event(board, &mut self.moves, &self.hold.clock, self.late_ticks) {
                     Ok(Some(next)) => self.timers.reschedule_first(next),
                     Ok(None) => self.timers.cancel(oid),
                     Err(reason) => self.shut_down(board, reason),
@@ -193,23 +253,56 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         if now.is_before(self.look_at) { self.look_at } else { now.wrapping_add(1) }
     }
 
-    /// Looks at the clock, which is due every few seconds.
+    /// Looks at the clock, which is due every few seconds and at every change of the motion clock.
     #[cold]
     #[inline(never)]
-    fn look(&mut self, now: Clock32) {
+    pub(crate) fn look(&mut self, now: Clock32) {
         self.uptime.look(now);
         self.look_at = self.stats.look(now);
+        self.hold.advance(now);
+        self.reports_pending |= self.hold.report_pending;
+        self.heaters.look(now);
+        for at in [self.hold.event_at(), self.heaters.event_at()].into_iter().flatten() {
+            if at.is_before(self.look_at) {
+                self.look_at = at;
+            }
+        }
+        if self.hold.take_retime() {
+            self.retime();
+        }
+    }
+
+    /// Sets the timers that wait on the motion clock, whose rate has changed.
+    fn retime(&mut self) {
+        let Self { objects, timers, hold, .. } = self;
+        for (oid, object) in objects.iter_mut() {
+            let wake = match object {
+                Object::Stepper(stepper) => match stepper.motion_wake() {
+                    Some(wake) => hold.clock.when(wake),
+                    None => continue,
+                },
+                Object::DigitalOut(output) if output.is_tied() => output.wake(&hold.clock),
+                _ => continue,
+            };
+            match wake {
+                Some(wake) => timers.schedule(oid, wake),
+                None => timers.cancel(oid),
+            }
+        }
     }
 
     /// The timers of everything but steppers.
     #[inline(never)]
     fn run_timer(&mut self, board: &mut impl Board, oid: u8, wake: Clock32) {
         let after = match self.objects.get_mut(oid) {
-            Some(Object::DigitalOut(output)) => output.event(board, &mut self.moves, wake),
+            Some(Object::DigitalOut(output)) => output.event(board, &mut self.moves, &self.hold.clock, wake),
             Some(Object::Endstop(endstop)) => Ok(endstop.event(board, wake)),
             Some(Object::AnalogIn(input)) => {
                 let after = input.event(board, wake);
                 self.reports_pending |= input.report_pending;
+                if let Some(sum) = input.take_sum() {
+                    self.heaters.feed(oid, sum);
+                }
                 after
             }
             Some(Object::Trsync(trsync)) => {
@@ -218,7 +311,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
                 let next = trsync.wake().map_or(After::Done, After::Again);
                 Ok(if let Due::Expired(reason) = due { After::Fire { trsync: oid, reason } } else { next })
             }
-            Some(Object::Stepper(_) | Object::Free) | None => Ok(After::Done),
+            Some(Object::Stepper(_) | Object::Heater | Object::Free) | None => Ok(After::Done),
         };
         match after {
             Ok(After::Again(next)) => self.timers.reschedule_first(next),
@@ -284,14 +377,18 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
     pub(crate) fn forget(&mut self, board: &mut impl Board) {
         self.stop_everything(board);
         self.objects.clear();
+        self.heaters = Heaters::new(self.clock);
         self.config_crc = None;
+        self.job = 0;
         self.halt.leave();
     }
 
     fn stop_everything(&mut self, board: &mut impl Board) {
         self.timers.clear();
         self.objects.shut_down(board);
+        self.heaters.shut_down();
         self.moves.reset();
+        self.hold = Hold::new(self.clock);
         self.reports_pending = false;
     }
 
@@ -310,6 +407,7 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
         self.starting
             || self.halt.announce
             || self.reports_pending
+            || self.heaters.is_due
             || self.stats.pending
             || self.receiver.is_ack_pending()
     }
@@ -329,6 +427,13 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
             self.reports_pending = false;
             self.report(board);
         }
+        if self.heaters.is_due {
+            self.run_heaters(board);
+        }
+        if self.hold.report_pending {
+            self.hold.report_pending = false;
+            self.report_motion(board);
+        }
         if self.stats.pending {
             let stats = self.stats.take();
             self.reply(board, &stats);
@@ -342,6 +447,10 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
                 Object::AnalogIn(input) if input.report_pending => {
                     let _ = self.receiver.send(board, &input.report(oid));
                     input.report_done();
+                }
+                Object::Stepper(stepper) if stepper.report_pending => {
+                    stepper.report_pending = !self.receiver.send(board, &stepper.progress(oid, self.job));
+                    self.reports_pending |= stepper.report_pending;
                 }
                 Object::Trsync(trsync) if trsync.report_pending => {
                     trsync.report_pending = false;

@@ -8,7 +8,9 @@
 //! |---|---|
 //! | `board` | what is asked of a chip |
 //! | `firmware`, `dispatch` | the whole; what each command does |
-//! | `receiver` | sequence numbers and acknowledgements |
+//! | `receiver` | sequence numbers, checks and acknowledgements |
+//! | `motion_clock`, `hold`, `motion_commands` | the clock that steps are due on; when it slows down and stops |
+//! | `heater`, `heater_commands` | temperature loops on the board, and what a silent host means to them |
 //! | `scheduler`, `moves` | timers; the pool of queued moves |
 //! | `objects` | what was configured, by oid |
 //! | `stepper`, `endstop`, `trsync`, `analog_in`, `digital_out` | the kinds of objects |
@@ -23,6 +25,11 @@ mod digital_out;
 mod dispatch;
 mod endstop;
 mod firmware;
+mod heater;
+mod heater_commands;
+mod hold;
+mod motion_clock;
+mod motion_commands;
 mod moves;
 mod objects;
 mod receiver;

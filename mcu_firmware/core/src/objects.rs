@@ -32,6 +32,8 @@ pub(crate) enum Object {
     Endstop(Endstop),
     AnalogIn(AnalogIn),
     DigitalOut(DigitalOut),
+    /// One of [`crate::heater::Heaters`], which are few and large.
+    Heater,
 }
 
 /// The objects; the first `allocated` of `N` may be used.
@@ -104,7 +106,7 @@ impl<const N: usize> Objects<N> {
     pub(crate) fn shut_down(&mut self, board: &mut impl Board) {
         for object in &mut self.slots {
             match object {
-                Object::Free => {}
+                Object::Free | Object::Heater => {}
                 Object::Stepper(stepper) => stepper.shut_down(board),
                 Object::Trsync(trsync) => trsync.shut_down(),
                 Object::Endstop(endstop) => endstop.shut_down(),

@@ -5,16 +5,39 @@
 //! direction is given to settle: the direction changes `pulse_ticks` before the first step of the new one (or when the
 //! last pulse ends, where that is later). So the edges depend on the plan alone, not on when its rows arrived.
 //!
-//! Steps are due on the clock that the host plans with, pulses are as long as the driver's data sheet wants: where the
-//! two clocks differ (a motion clock that slows down), `step_clock` is of the first and the rest of the second.
+//! Steps and turns are due on the motion clock that the host plans with; pulses and gaps are as long as the driver's
+//! data sheet wants, on the hardware clock, and end even while the motion clock is held.
 
 use units::Clock32;
-use wire::ShutdownReason;
+use wire::{Response, RowCheck, ShutdownReason};
 
 use crate::{
     board::{Board, Pin},
+    motion_clock::MotionClock,
     moves::{MovePool, Queue, StepMove},
 };
+
+/// What comes next between pulses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Next {
+    /// The step, at its motion clock.
+    Step,
+    /// The change of direction before it, on the motion clock.
+    Turn,
+    /// The end of the time that the pins need, on the hardware clock; the step may be due already.
+    Gap,
+}
+
+/// The rows of a job.
+struct Rows {
+    received: u32,
+    done: u32,
+    check: RowCheck,
+}
+
+impl Rows {
+    const NONE: Self = Self { received: 0, done: 0, check: RowCheck::new() };
+}
 
 pub(crate) struct Stepper {
     step_pin: Pin,
@@ -24,13 +47,12 @@ pub(crate) struct Stepper {
     pulse_ticks: u32,
     /// A pulse has begun and not ended.
     in_pulse: bool,
-    /// The direction has to change before the next step.
-    turning: bool,
+    next: Next,
     /// The level of the direction pin; high counts the position up.
     forward: bool,
     /// The direction of moves that are yet to come from the host.
     next_forward: bool,
-    /// The planned clock of the next step; of the last one during its pulse and when none is left.
+    /// The planned motion clock of the next step; of the last one during its pulse and when none is left.
     step_clock: Clock32,
     interval: u32,
     add: i16,
@@ -38,10 +60,15 @@ pub(crate) struct Stepper {
     left: u16,
     queue: Queue,
     position: i32,
-    /// A trigger stopped it: rows are ignored until the host resets the clock.
+    /// A trigger stopped it, or its queue was dropped: rows are ignored until the host resets the clock.
     stopped: bool,
+    /// Steps that were left in the current row when the queue was dropped, and their direction.
+    dropped: (u16, bool),
+    rows: Rows,
     /// The trigger that stops it.
     pub(crate) stop_on: Option<u8>,
+    /// How far it came is still to be told.
+    pub(crate) report_pending: bool,
 }
 
 impl Stepper {
@@ -59,7 +86,7 @@ impl Stepper {
             inverted,
             pulse_ticks,
             in_pulse: false,
-            turning: false,
+            next: Next::Step,
             forward: false,
             next_forward: false,
             step_clock: Clock32(0),
@@ -69,22 +96,30 @@ impl Stepper {
             queue: Queue::new(),
             position: 0,
             stopped: false,
+            dropped: (0, false),
+            rows: Rows::NONE,
             stop_on: None,
+            report_pending: false,
         })
     }
 
-    /// The next edge, and when the one after it is due. Steps that are due before the pin may rise again are put off,
-    /// not lost.
+    /// The next edge, and when the one after it is due; nothing where that is on the motion clock and out of its reach.
+    /// Steps that are due before the pin may rise again are put off, not lost.
     #[inline]
     pub(crate) fn event<const M: usize>(
         &mut self,
         board: &mut impl Board,
         moves: &mut MovePool<M>,
+        motion: &MotionClock,
         late_ticks: u32,
     ) -> Result<Option<Clock32>, ShutdownReason> {
         if !self.in_pulse {
-            if self.turning {
-                return Ok(Some(self.turn(board)));
+            if self.next != Next::Step {
+                let due = self.prepare(board, motion);
+                if due.is_none_or(|due| due.since(board.now()) > 0) {
+                    return Ok(due);
+                }
+                self.next = Next::Step;
             }
             board.set_pin(self.step_pin, !self.inverted);
             self.in_pulse = true;
@@ -95,58 +130,106 @@ impl Stepper {
         board.set_pin(self.step_pin, self.inverted);
         self.in_pulse = false;
         if self.left != 0 {
+            self.step_clock = self.next_clock();
             self.interval = self.interval.wrapping_add_signed(i32::from(self.add));
-            self.step_clock = self.step_clock.wrapping_add(self.interval);
-        } else if !self.load(moves) {
+        } else if !self.load_next(moves) {
             return Ok(None);
-        } else if let Some(wake) = self.start_turning(board) {
-            return Ok(Some(wake));
+        } else if self.next == Next::Turn && !self.turn_if_due(board, motion) {
+            return Ok(motion.when(self.turn_clock()));
         }
         let earliest = board.now().wrapping_add(self.pulse_ticks);
-        let ahead = self.step_clock.since(earliest);
-        if ahead >= 0 {
-            Ok(Some(self.step_clock))
-        } else if ahead.unsigned_abs() > late_ticks {
-            Err(ShutdownReason::StepperTooFarInPast)
-        } else {
-            Ok(Some(earliest))
+        if let Some(due) = motion.when(self.step_clock) {
+            let ahead = due.since(earliest);
+            if ahead >= 0 {
+                return Ok(Some(due));
+            }
+            if ahead.unsigned_abs() > late_ticks {
+                return Err(ShutdownReason::StepperTooFarInPast);
+            }
+        }
+        // Out of the motion clock's reach it counts too: a ramp may bring the step within it sooner than that.
+        self.next = Next::Gap;
+        Ok(Some(earliest))
+    }
+
+    /// A turn or the end of a gap; when the step is due, if that is within reach.
+    #[inline(never)]
+    fn prepare(&mut self, board: &mut impl Board, motion: &MotionClock) -> Option<Clock32> {
+        if self.next == Next::Turn {
+            self.turn(board);
+            return Some(self.after_gap(board, motion));
+        }
+        self.next = Next::Step;
+        motion.when(self.step_clock)
+    }
+
+    /// The step, but not before the pins have had their time from now on.
+    fn after_gap(&mut self, board: &mut impl Board, motion: &MotionClock) -> Clock32 {
+        let earliest = board.now().wrapping_add(self.pulse_ticks);
+        match motion.when(self.step_clock) {
+            Some(due) if !due.is_before(earliest) => {
+                self.next = Next::Step;
+                due
+            }
+            _ => {
+                self.next = Next::Gap;
+                earliest
+            }
         }
     }
 
-    /// Takes the next row off the queue; `false` when there is none.
+    /// Goes on to the next row when one is finished; `false` when there is none.
     #[inline(never)]
+    fn load_next<const M: usize>(&mut self, moves: &mut MovePool<M>) -> bool {
+        // A row that was cut off was counted, or not, when that happened.
+        self.rows.done = self.rows.done.wrapping_add(u32::from(!self.stopped));
+        self.load(moves)
+    }
+
+    /// Takes the next row off the queue; `false` when there is none.
     fn load<const M: usize>(&mut self, moves: &mut MovePool<M>) -> bool {
         let Some(row) = moves.pop::<StepMove>(&mut self.queue) else { return false };
         self.interval = row.interval;
         self.add = row.add;
         self.left = row.count;
         self.step_clock = self.step_clock.wrapping_add(row.interval);
-        self.turning = row.forward != self.forward;
+        self.next = if row.forward == self.forward { Next::Step } else { Next::Turn };
         true
     }
 
-    /// When to turn, if the row that was just loaded needs it and it is not time yet; where it is, turns at once.
-    #[inline(never)]
-    fn start_turning(&mut self, board: &mut impl Board) -> Option<Clock32> {
-        if !self.turning {
-            return None;
-        }
-        let at = self.step_clock.wrapping_add(self.pulse_ticks.wrapping_neg());
-        if at.since(board.now()) > 0 {
-            return Some(at);
-        }
-        self.turn(board);
-        None
+    /// The motion clock of the step after the one that was made last.
+    const fn next_clock(&self) -> Clock32 {
+        self.step_clock.wrapping_add(self.interval.wrapping_add_signed(self.add as i32))
     }
 
-    /// Changes the direction; the earliest clock of the step that follows.
+    const fn turn_clock(&self) -> Clock32 {
+        self.step_clock.wrapping_add(self.pulse_ticks.wrapping_neg())
+    }
+
+    /// Turns if it is time; whether it was.
     #[inline(never)]
-    fn turn(&mut self, board: &mut impl Board) -> Clock32 {
-        self.turning = false;
+    fn turn_if_due(&mut self, board: &mut impl Board, motion: &MotionClock) -> bool {
+        let is_due = motion.when(self.turn_clock()).is_some_and(|at| at.since(board.now()) <= 0);
+        if is_due {
+            self.turn(board);
+        }
+        is_due
+    }
+
+    /// Changes the direction.
+    fn turn(&mut self, board: &mut impl Board) {
+        self.next = Next::Step;
         self.forward = !self.forward;
         board.set_pin(self.dir_pin, self.forward);
-        let earliest = board.now().wrapping_add(self.pulse_ticks);
-        if self.step_clock.is_before(earliest) { earliest } else { self.step_clock }
+    }
+
+    /// What waits on the motion clock, and for when; nothing while the timer is on the hardware clock, or none runs.
+    pub(crate) const fn motion_wake(&self) -> Option<Clock32> {
+        match self.next {
+            Next::Step if self.left != 0 && !self.in_pulse => Some(self.step_clock),
+            Next::Turn if self.left != 0 && !self.in_pulse => Some(self.turn_clock()),
+            _ => None,
+        }
     }
 
     /// Queues a row; the clock at which to wake when the stepper was idle.
@@ -154,6 +237,7 @@ impl Stepper {
         &mut self,
         board: &mut impl Board,
         moves: &mut MovePool<M>,
+        motion: &MotionClock,
         (interval, count, add): (u32, u16, i16),
     ) -> Result<Option<Clock32>, ShutdownReason> {
         if !is_row_valid(interval, count, add) {
@@ -164,20 +248,20 @@ impl Stepper {
         }
         let is_busy = self.is_active() || self.in_pulse;
         moves.push(&mut self.queue, StepMove { interval, count, add, forward: self.next_forward })?;
+        self.rows.received = self.rows.received.wrapping_add(1);
+        self.rows.check.add(interval, count, add, self.next_forward);
         if is_busy {
             return Ok(None);
         }
         self.load(moves);
-        let now = board.now();
-        if self.step_clock.is_before(now) {
+        if self.step_clock.is_before(motion.motion(board.now())) {
             return Err(ShutdownReason::TimerTooClose);
         }
-        if let Some(wake) = self.start_turning(board) {
-            return Ok(Some(wake));
+        if self.next == Next::Turn && !self.turn_if_due(board, motion) {
+            return Ok(motion.when(self.turn_clock()));
         }
         // The direction may have changed just now, or the last pulse ended just now.
-        let earliest = now.wrapping_add(self.pulse_ticks);
-        Ok(Some(if self.step_clock.is_before(earliest) { earliest } else { self.step_clock }))
+        Ok(Some(self.after_gap(board, motion)))
     }
 
     pub(crate) const fn set_next_dir(&mut self, forward: bool) {
@@ -190,7 +274,63 @@ impl Stepper {
         }
         self.step_clock = clock;
         self.stopped = false;
+        self.dropped = (0, self.forward);
         Ok(())
+    }
+
+    /// Begins a new count of rows, which is only done when none is left of the last.
+    pub(crate) const fn begin_job(&mut self) -> Result<(), ShutdownReason> {
+        if self.is_active() || self.in_pulse {
+            return Err(ShutdownReason::StepperActive);
+        }
+        self.rows = Rows::NONE;
+        Ok(())
+    }
+
+    /// How far it has come in its rows.
+    pub(crate) const fn progress(&self, oid: u8, job: u32) -> Response<'static> {
+        let mut next = self.step_clock;
+        if self.in_pulse && self.left != 0 {
+            next = self.next_clock();
+        }
+        let (left, forward) = match self.next {
+            _ if self.stopped => self.dropped,
+            Next::Turn => (self.left, !self.forward),
+            Next::Step | Next::Gap => (self.left, self.forward),
+        };
+        Response::StepperQueue {
+            oid,
+            job,
+            received: self.rows.received,
+            done: self.rows_done(),
+            left,
+            next: next.0,
+            dir: forward as u8,
+            pos: self.position,
+            crc: self.rows.check.value(),
+        }
+    }
+
+    /// A row is done when its last step has begun.
+    const fn rows_done(&self) -> u32 {
+        self.rows.done.wrapping_add((self.in_pulse && self.left == 0 && !self.stopped) as u32)
+    }
+
+    /// Drops what is queued, at rest; what was left of the current row is kept for [`Self::progress`]. Whether the timer
+    /// may be stopped.
+    pub(crate) fn drop_queue<const M: usize>(&mut self, moves: &mut MovePool<M>) -> bool {
+        if self.stopped {
+            return !self.in_pulse;
+        }
+        if self.in_pulse && self.left != 0 {
+            self.step_clock = self.next_clock();
+        }
+        let dropped = (self.left, self.forward ^ (self.next == Next::Turn));
+        let stop_on = self.stop_on;
+        let may_stop = self.stop(moves);
+        self.stop_on = stop_on;
+        self.dropped = dropped;
+        may_stop
     }
 
     /// Steps made so far, those towards a high direction pin less those towards a low one.
@@ -201,9 +341,11 @@ impl Stepper {
     /// Drops what is queued. Whether the timer may be stopped: a pulse that has begun still has to end.
     pub(crate) fn stop<const M: usize>(&mut self, moves: &mut MovePool<M>) -> bool {
         moves.clear(&mut self.queue);
+        self.rows.done = self.rows_done();
         self.left = 0;
-        self.turning = false;
+        self.next = Next::Step;
         self.stopped = true;
+        self.dropped = (0, self.forward);
         self.stop_on = None;
         !self.in_pulse
     }
@@ -212,11 +354,12 @@ impl Stepper {
     pub(crate) fn shut_down(&mut self, board: &mut impl Board) {
         board.set_pin(self.step_pin, self.inverted);
         self.in_pulse = false;
-        self.turning = false;
+        self.next = Next::Step;
         self.queue = Queue::new();
         self.left = 0;
         self.stopped = true;
         self.stop_on = None;
+        self.report_pending = false;
     }
 
     const fn is_active(&self) -> bool {

@@ -14,13 +14,26 @@ pub struct Faults {
     pub bytes: ByteFaults,
     /// What fails, and when.
     pub failures: Vec<Failure>,
+    /// When the host is held up, for whoever runs the host: the printer itself does nothing about it.
+    pub host_stalls: Vec<HostStall>,
+}
+
+/// A host that does nothing for a while: its computer sleeps, or does something else. Bytes wait meanwhile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HostStall {
+    /// From when on.
+    pub at: Seconds,
+    /// For how long.
+    pub lasts: Seconds,
 }
 
 /// Probabilities per byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ByteFaults {
-    /// One random bit is flipped.
+    /// Another byte comes in its place, any of them.
     pub corrupt: f64,
+    /// One random bit is flipped.
+    pub flip: f64,
     /// The byte is lost.
     pub drop: f64,
     /// The byte comes twice.
@@ -45,6 +58,8 @@ pub enum FailureKind {
     Unplug,
     /// The cable is put back.
     Replug,
+    /// The board starts anew, as after a dip of its supply: all pins are let go, and it knows nothing of before.
+    BoardReset,
     /// The heater's sensor has come off: the converter reads full scale.
     SensorOpen(String),
     /// The heater's sensor is short-circuited: the converter reads zero.
@@ -60,9 +75,9 @@ pub enum FailureKind {
 }
 
 /// The items that [`Faults`] reads, for help texts.
-pub const FAULT_ITEMS: &str = "corrupt=P, drop=P, duplicate=P, delay=P (probability per byte), unplug@T, replug@T, \
-    sensor-open=HEATER@T, sensor-short=HEATER@T, heater-dead=HEATER@T, heater-stuck-on=HEATER@T, \
-    endstop-stuck-on=AXIS@T, endstop-stuck-off=AXIS@T (T: seconds since power-up, 0 when left out)";
+pub const FAULT_ITEMS: &str = "corrupt=P (another byte), flip=P (one bit), drop=P, duplicate=P, delay=P (probability per \
+    byte), unplug@T, replug@T, outage=SECONDS@T (both), board-reset@T, sensor-open=HEATER@T, sensor-short=HEATER@T, heater-dead=HEATER@T, heater-stuck-on=HEATER@T, \
+    endstop-stuck-on=AXIS@T, endstop-stuck-off=AXIS@T, host-stall=SECONDS@T (T: seconds since power-up, 0 when left out)";
 
 /// Why a fault cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -103,26 +118,34 @@ fn parse_item(item: &str) -> Result<Faults, &'static str> {
         None => (what, None),
     };
     let mut faults = Faults::default();
-    if matches!(name, "corrupt" | "drop" | "duplicate" | "delay") {
+    if let Some(of_bytes) = faults.bytes.named(name) {
         if at.is_some() {
             return Err("faults on bytes have a probability and no time");
         }
-        let probability = parse_probability(value.ok_or("the probability is missing")?)?;
-        match name {
-            "corrupt" => faults.bytes.corrupt = probability,
-            "drop" => faults.bytes.drop = probability,
-            "duplicate" => faults.bytes.duplicate = probability,
-            _ => faults.bytes.delay = probability,
+        *of_bytes = parse_probability(value.ok_or("the probability is missing")?)?;
+        return Ok(faults);
+    }
+    if matches!(name, "host-stall" | "outage") {
+        let lasts = parse_duration(value.ok_or("the duration is missing")?)?;
+        let at = at.unwrap_or(Seconds::ZERO);
+        if name == "host-stall" {
+            faults.host_stalls.push(HostStall { at, lasts });
+        } else {
+            faults.failures.push(Failure { at, kind: FailureKind::Unplug });
+            faults.failures.push(Failure { at: at + lasts, kind: FailureKind::Replug });
         }
         return Ok(faults);
     }
-    let at = at.unwrap_or(Seconds::ZERO);
     let part =
         || value.filter(|value| !value.is_empty()).map(str::to_owned).ok_or("the part's name is missing");
+    let at = at.unwrap_or(Seconds::ZERO);
     let kind = match name {
-        "unplug" | "replug" if value.is_some() => return Err("the cable has no name"),
+        "unplug" | "replug" | "board-reset" if value.is_some() => {
+            return Err("there is only one: it has no name");
+        }
         "unplug" => FailureKind::Unplug,
         "replug" => FailureKind::Replug,
+        "board-reset" => FailureKind::BoardReset,
         "sensor-open" => FailureKind::SensorOpen(part()?),
         "sensor-short" => FailureKind::SensorShort(part()?),
         "heater-dead" => FailureKind::HeaterDead(part()?),
@@ -144,6 +167,10 @@ fn parse_time(text: &str) -> Result<Seconds, &'static str> {
     }
 }
 
+fn parse_duration(text: &str) -> Result<Seconds, &'static str> {
+    parse_time(text).map_err(|_| "the duration must be seconds")
+}
+
 fn parse_probability(text: &str) -> Result<f64, &'static str> {
     match text.parse::<f64>() {
         Ok(probability) if (0.0..=1.0).contains(&probability) => Ok(probability),
@@ -159,11 +186,11 @@ impl AddAssign for Faults {
                 *mine = theirs;
             }
         };
-        set(&mut self.bytes.corrupt, other.bytes.corrupt);
-        set(&mut self.bytes.drop, other.bytes.drop);
-        set(&mut self.bytes.duplicate, other.bytes.duplicate);
-        set(&mut self.bytes.delay, other.bytes.delay);
+        for (mine, theirs) in self.bytes.all_mut().into_iter().zip(other.bytes.all()) {
+            set(mine, theirs);
+        }
         self.failures.extend(other.failures);
+        self.host_stalls.extend(other.host_stalls);
     }
 }
 
@@ -174,7 +201,26 @@ impl ByteFaults {
     }
 
     pub(crate) fn are_probabilities(&self) -> bool {
-        [self.corrupt, self.drop, self.duplicate, self.delay].iter().all(|p| (0.0..=1.0).contains(p))
+        self.all().iter().all(|p| (0.0..=1.0).contains(p))
+    }
+
+    fn named(&mut self, name: &str) -> Option<&mut f64> {
+        Some(match name {
+            "corrupt" => &mut self.corrupt,
+            "flip" => &mut self.flip,
+            "drop" => &mut self.drop,
+            "duplicate" => &mut self.duplicate,
+            "delay" => &mut self.delay,
+            _ => return None,
+        })
+    }
+
+    const fn all(&self) -> [f64; 5] {
+        [self.corrupt, self.flip, self.drop, self.duplicate, self.delay]
+    }
+
+    const fn all_mut(&mut self) -> [&mut f64; 5] {
+        [&mut self.corrupt, &mut self.flip, &mut self.drop, &mut self.duplicate, &mut self.delay]
     }
 }
 
@@ -198,6 +244,14 @@ mod tests {
         ];
         let expected = expected.map(|(at, kind)| Failure { at: Seconds(at), kind });
         assert_eq!(faults.failures, expected);
+        faults += "host-stall=2.5@30".parse().expect("a fault");
+        assert_eq!(faults.host_stalls, [HostStall { at: Seconds(30.0), lasts: Seconds(2.5) }]);
+        let outage: Faults = "outage=1.5@10,board-reset@20,flip=0.5".parse().expect("faults");
+        let expected =
+            [(10.0, FailureKind::Unplug), (11.5, FailureKind::Replug), (20.0, FailureKind::BoardReset)];
+        assert_eq!(outage.failures, expected.map(|(at, kind)| Failure { at: Seconds(at), kind }));
+        faults += outage;
+        assert_eq!((faults.bytes.corrupt, faults.bytes.flip), (0.01, 0.5));
     }
 
     #[test]
@@ -208,8 +262,11 @@ mod tests {
             ("corrupt=0.1@3", "no time"),
             ("sensor-open@3", "name is missing"),
             ("unplug=x@3", "no name"),
+            ("outage@3", "missing"),
             ("unplug@soon", "seconds"),
             ("fire", "no such fault"),
+            ("host-stall@3", "missing"),
+            ("host-stall=long@3", "must be seconds"),
             ("drop=nan", "between 0 and 1"),
         ] {
             let error = text.parse::<Faults>().expect_err(text).to_string();

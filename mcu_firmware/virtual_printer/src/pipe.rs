@@ -112,7 +112,8 @@ impl Pipe {
             let drop = self.chance.chance(self.faults.drop);
             let duplicate = self.chance.chance(self.faults.duplicate);
             let corrupt = self.chance.chance(self.faults.corrupt);
-            self.damaged += u64::from(delay | drop | duplicate | corrupt);
+            let flip = self.chance.chance(self.faults.flip);
+            self.damaged += u64::from(delay | drop | duplicate | corrupt | flip);
             if delay {
                 self.arrive(at, len);
                 len = 0;
@@ -121,7 +122,13 @@ impl Pipe {
             if drop {
                 continue;
             }
-            let byte = if corrupt { byte ^ (1 << self.chance.below(8)) } else { byte };
+            let mut byte = byte;
+            if corrupt {
+                byte ^= 1 + self.chance.below(255) as u8;
+            }
+            if flip {
+                byte ^= 1 << self.chance.below(8);
+            }
             let copies = 1 + usize::from(duplicate);
             self.bytes.extend(std::iter::repeat_n(byte, copies));
             len += copies;
@@ -206,15 +213,20 @@ mod tests {
 
     #[test]
     fn faults_hit_as_often_as_they_say() {
-        let faults = ByteFaults { corrupt: 0.01, ..ByteFaults::default() };
-        let mut pipe = pipe(LinkProfile::Usb, faults);
-        pipe.send(0, &vec![0; 100_000]);
-        let got = all(&mut pipe);
-        let hit = got.iter().filter(|&&byte| byte != 0).count();
-        assert!((850..1150).contains(&hit), "{hit}");
-        assert!(got.iter().all(|byte| byte.count_ones() <= 1), "one bit a byte");
+        let hit = |faults| {
+            let mut pipe = pipe(LinkProfile::Usb, faults);
+            pipe.send(0, &vec![0; 100_000]);
+            let hit: Vec<u8> = all(&mut pipe).into_iter().filter(|&byte| byte != 0).collect();
+            assert!((850..1150).contains(&hit.len()), "{}", hit.len());
+            hit
+        };
+        let flipped = hit(ByteFaults { flip: 0.01, ..ByteFaults::default() });
+        assert!(flipped.iter().all(|byte| byte.is_power_of_two()), "one bit a byte");
+        let corrupted = hit(ByteFaults { corrupt: 0.01, ..ByteFaults::default() });
+        let bits = corrupted.iter().map(|byte| byte.count_ones()).sum::<u32>() as usize;
+        assert!((38..42).contains(&(bits * 10 / corrupted.len())), "any byte: half of its bits");
         let faults = ByteFaults { drop: 0.1, duplicate: 0.02, ..ByteFaults::default() };
-        let mut pipe = self::pipe(LinkProfile::Usb, faults);
+        let mut pipe = pipe(LinkProfile::Usb, faults);
         pipe.send(0, &vec![0; 100_000]);
         let got = all(&mut pipe).len();
         assert!((91_000..92_600).contains(&got), "{got}");

@@ -42,6 +42,8 @@ pub struct VirtualPrinter<R: Recorder> {
     /// What fails, soonest last.
     failures: Vec<(u64, FailureKind)>,
     arrived: Vec<u8>,
+    /// How far the motion clock is behind the board's.
+    behind: u64,
 }
 
 impl<R: Recorder> VirtualPrinter<R> {
@@ -86,6 +88,7 @@ impl<R: Recorder> VirtualPrinter<R> {
             retry_ticks,
             failures: Vec::new(),
             arrived: Vec::new(),
+            behind: 0,
         };
         printer.schedule(&faults.failures)?;
         Ok(printer)
@@ -105,7 +108,7 @@ impl<R: Recorder> VirtualPrinter<R> {
 
     fn check_target(&self, kind: &FailureKind) -> Result<(), WiringError> {
         let (name, known) = match kind {
-            FailureKind::Unplug | FailureKind::Replug => return Ok(()),
+            FailureKind::Unplug | FailureKind::Replug | FailureKind::BoardReset => return Ok(()),
             FailureKind::SensorOpen(name)
             | FailureKind::SensorShort(name)
             | FailureKind::HeaterDead(name)
@@ -209,9 +212,28 @@ impl<R: Recorder> VirtualPrinter<R> {
     #[inline]
     fn run_timers(&mut self) {
         let now = self.board.clock;
+        let behind = self.motion_behind();
+        if behind != self.behind {
+            self.behind = behind;
+            self.board.recorder.motion_behind(Ticks(behind));
+        }
         let next = self.firmware.run_timers(&mut self.board);
         // A timer that is still due is asked for again a tick later: time always moves on.
         self.next_timer = Ticks(now).nearest(next).0.max(now + 1);
+    }
+
+    /// How far the motion clock is behind now. It falls further behind while motion is slow, and is level again after a
+    /// reset.
+    fn motion_behind(&self) -> u64 {
+        let clock = Ticks(self.board.clock).low();
+        let behind = clock.0.wrapping_sub(self.firmware.motion_clock(clock).0);
+        let more = behind.wrapping_sub(self.behind as u32);
+        if more < 1 << 31 { self.behind + u64::from(more) } else { u64::from(behind) }
+    }
+
+    /// The board's motion clock, by which steps are made: the board's clock, less the time that motion was held.
+    pub fn motion_now(&self) -> Ticks {
+        Ticks(self.board.clock - self.motion_behind())
     }
 
     fn run_tasks(&mut self) {
@@ -293,6 +315,7 @@ impl<R: Recorder> VirtualPrinter<R> {
                 self.board.up.clear();
             }
             FailureKind::Replug => self.board.plugged = true,
+            FailureKind::BoardReset => self.board.restart_wanted = true,
             FailureKind::SensorOpen(name) | FailureKind::SensorShort(name) => {
                 let reads = if matches!(kind, FailureKind::SensorOpen(_)) { ADC_MAX } else { 0 };
                 if let Some(index) = heater(name) {
@@ -355,7 +378,10 @@ impl<R: Recorder> VirtualPrinter<R> {
 }
 
 fn new_firmware(profile: &BoardProfile) -> Box<Firmware<OBJECTS_MAX, MOVES_MAX>> {
-    Box::new(Firmware::new(profile.clock).with_move_count(profile.move_count))
+    let firmware = Firmware::new(profile.clock).with_move_count(profile.move_count);
+    let firmware = if profile.motion_clock { firmware } else { firmware.without_motion_clock() };
+    let firmware = if profile.block_check { firmware } else { firmware.without_block_check() };
+    Box::new(if profile.board_heaters { firmware } else { firmware.without_heaters() })
 }
 
 fn motor_view(axis: &Axis) -> MotorView {

@@ -30,6 +30,12 @@ pub struct BoardProfile {
     pub clock_at_start: Ticks,
     /// What a restart of the firmware takes; a USB board is gone from the bus in the meantime.
     pub restart: Seconds,
+    /// Whether the firmware has our motion clock.
+    pub motion_clock: bool,
+    /// Whether the firmware regulates heaters.
+    pub board_heaters: bool,
+    /// Whether the firmware knows the block check. Without all three the board is as one with plain Klipper firmware.
+    pub block_check: bool,
 }
 
 /// Most moves that any board's queue holds.
@@ -60,9 +66,17 @@ impl LinkProfile {
 }
 
 impl BoardProfile {
-    /// Boards by the names that users give.
+    /// Boards by the names that users give; with `-plain` behind it, as it is with plain Klipper firmware.
     pub fn named(name: &str) -> Option<Self> {
-        Self::all().into_iter().find(|profile| profile.name == name)
+        let (name, is_plain) = name.strip_suffix("-plain").map_or((name, false), |name| (name, true));
+        let profile = Self::all().into_iter().find(|profile| profile.name == name)?;
+        Some(if is_plain { profile.plain() } else { profile })
+    }
+
+    /// The same board with plain Klipper firmware: without our extensions.
+    #[must_use]
+    pub fn plain(self) -> Self {
+        Self { motion_clock: false, board_heaters: false, block_check: false, ..self }
     }
 
     /// Every board.
@@ -83,6 +97,9 @@ impl BoardProfile {
             link: LinkProfile::Usb,
             clock_at_start: before_the_wrap(clock),
             restart: Seconds(0.5),
+            motion_clock: true,
+            board_heaters: true,
+            block_check: true,
         }
     }
 
@@ -99,6 +116,9 @@ impl BoardProfile {
             link: LinkProfile::Uart { baud: 250_000, receive_window: 192 },
             clock_at_start: before_the_wrap(clock),
             restart: Seconds(0.1),
+            motion_clock: true,
+            board_heaters: true,
+            block_check: true,
         }
     }
 
@@ -136,6 +156,9 @@ impl BoardProfile {
             build_versions: "virtual".to_owned(),
             constants,
             pins: self.pins.iter().map(|&(name, first, count)| (name.to_owned(), first, count)).collect(),
+            motion_clock: self.motion_clock,
+            board_heaters: self.board_heaters,
+            block_check: self.block_check,
         }
     }
 }
@@ -164,5 +187,6 @@ mod tests {
         }
         assert_eq!(BoardProfile::named("stm32f103").map(|profile| profile.move_count), Some(700));
         assert_eq!(BoardProfile::named("nothing"), None);
+        assert_eq!(BoardProfile::named("rp2040-plain"), Some(BoardProfile::rp2040().plain()));
     }
 }

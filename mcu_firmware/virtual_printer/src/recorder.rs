@@ -12,6 +12,12 @@ pub trait Recorder {
     /// motor since power-up, this one included.
     fn step(&mut self, motor: usize, at: Ticks, forward: bool, count: i64);
 
+    /// The motion clock is this much behind the board's clock from now on, until this is called again: for each edge
+    /// while motion speeds up or slows down. Zero before the first call.
+    fn motion_behind(&mut self, behind: Ticks) {
+        let _ = behind;
+    }
+
     /// A pulse ends.
     fn step_end(&mut self, motor: usize, at: Ticks) {
         let _ = (motor, at);

@@ -49,6 +49,8 @@ pub enum PhaseLabel {
     Restarting,
     /// The board's pins are being set up.
     Configuring,
+    /// The board holds a print whose page is gone: it can be taken up with its journal, or the board restarted.
+    Holding,
     /// Ready for commands.
     Ready,
     /// The board has stopped everything and says why; a firmware restart is needed.
@@ -64,6 +66,7 @@ impl From<PhaseName> for PhaseLabel {
             PhaseName::Synchronising => Self::Synchronising,
             PhaseName::Restarting => Self::Restarting,
             PhaseName::Configuring => Self::Configuring,
+            PhaseName::Holding => Self::Holding,
             PhaseName::Ready => Self::Ready,
             PhaseName::Shutdown => Self::Shutdown,
             PhaseName::Failed => Self::Failed,
@@ -100,6 +103,8 @@ pub enum UiEvent {
         target_c: f64,
         /// The share of time that it is on.
         duty: f64,
+        /// The board has lowered it, or switched it off, because it was out of touch with its host.
+        standby: bool,
     },
     /// An axis found its endstop.
     Homed {
@@ -127,7 +132,12 @@ pub enum UiEvent {
     },
     /// The job was paused, and the machine is at rest.
     Paused,
-    /// The job goes on.
+    /// The board brought motion to rest on its path and waits for the user: to resume or to cancel.
+    Held {
+        /// Why.
+        error: ErrorMessage,
+    },
+    /// The job, or what was held, goes on.
     Resumed,
     /// The job ended; all its moves have been made.
     JobDone,
@@ -153,11 +163,12 @@ impl UiEvent {
             Event::Identified { version, mcu, clock_freq } => {
                 Self::Identified { version: version.clone(), mcu: mcu.clone(), clock_freq_hz: *clock_freq }
             }
-            Event::Temperature { heater, temperature, target, duty } => Self::Temperature {
+            Event::Temperature { heater, temperature, target, duty, standby } => Self::Temperature {
                 heater: HeaterName::of(*heater)?,
                 temperature_c: temperature.0,
                 target_c: target.0,
                 duty: *duty,
+                standby: *standby,
             },
             Event::Homed { axis, position_mm, .. } => {
                 Self::Homed { axis: *axis as u8, position_mm: *position_mm }
@@ -166,6 +177,7 @@ impl UiEvent {
             Event::Message(text) => Self::Message { text: text.clone() },
             Event::Notice(diagnostic) => Self::Notice { finding: diagnostic.into() },
             Event::Paused => Self::Paused,
+            Event::Held(error) => Self::Held { error: error.into() },
             Event::Resumed => Self::Resumed,
             Event::JobDone => Self::JobDone,
             Event::JobCancelled => Self::JobCancelled,
@@ -199,9 +211,11 @@ mod tests {
             temperature: Celsius(59.5),
             target: Celsius(60.0),
             duty: 0.25,
+            standby: false,
         };
         let expected = serde_json::json!({
-            "type": "temperature", "heater": "heater_bed", "temperature_c": 59.5, "target_c": 60.0, "duty": 0.25
+            "type": "temperature", "heater": "heater_bed", "temperature_c": 59.5, "target_c": 60.0, "duty": 0.25,
+            "standby": false
         });
         assert_eq!(json(&reading), expected);
         let progress = json(&Event::Progress { line: 7, elapsed: Seconds(1.5) });

@@ -8,6 +8,7 @@
 mod config;
 mod error;
 mod event;
+mod journal;
 mod preview;
 mod request;
 mod snapshot;
@@ -16,6 +17,7 @@ mod virtual_state;
 pub use config::{ConfigFinding, ConfigReport, ConfigSeverity, HeaterSummary, MachineSummary};
 pub use error::ErrorMessage;
 pub use event::{HeaterName, PhaseLabel, UiEvent};
+pub use journal::JournalView;
 pub use preview::{
     Blocking, FeatureSummary, FileKindReport, Finding, FindingSeverity, LayerSummary, PreviewSummary,
 };

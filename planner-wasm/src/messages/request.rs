@@ -77,6 +77,13 @@ pub enum UiRequest {
         /// How fast.
         speed_mm_s: f64,
     },
+    /// An axis stands there: the user says so, and it counts as homed.
+    SetPosition {
+        /// Which one.
+        axis: JogAxis,
+        /// Where.
+        position_mm: f64,
+    },
     /// Motors without current; positions are lost.
     MotorsOff,
     /// The job comes to rest and waits.
@@ -112,6 +119,9 @@ impl From<UiRequest> for Request {
             UiRequest::Extrude { length_mm, speed_mm_s } => {
                 Self::MoveBy { axis: EXTRUDER, distance: Mm(length_mm), speed: MmPerS(speed_mm_s) }
             }
+            UiRequest::SetPosition { axis, position_mm } => {
+                Self::SetPosition { axis: axis as usize, position: Mm(position_mm) }
+            }
             UiRequest::MotorsOff => Self::Gcode("M84".to_owned()),
             UiRequest::Pause => Self::Pause,
             UiRequest::Resume => Self::Resume,
@@ -139,12 +149,19 @@ pub struct JobRequest {
     pub confirmed_lines: Vec<u32>,
     /// Confirm all of them.
     pub confirm_all: bool,
+    /// The print's own number, with which a journal is kept: any that no other print has.
+    #[serde(default)]
+    pub journal: Option<u32>,
+    /// The line with which the job begins, paused; `null`: with its file.
+    #[serde(default)]
+    pub start_line: Option<u32>,
 }
 
 impl From<JobRequest> for JobOptions {
     fn from(request: JobRequest) -> Self {
         let confirmed_lines: BTreeSet<u32> = request.confirmed_lines.into_iter().collect();
-        Self { confirmed_lines, confirm_all: request.confirm_all }
+        let JobRequest { confirm_all, journal, start_line, .. } = request;
+        Self { confirmed_lines, confirm_all, journal, start_line }
     }
 }
 

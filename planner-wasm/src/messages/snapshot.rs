@@ -61,6 +61,8 @@ pub struct TemperatureView {
     pub target_c: f64,
     /// The share of time that it is on.
     pub duty: f64,
+    /// The board has lowered it, or switched it off, because it was out of touch with its host.
+    pub standby: bool,
 }
 
 /// What a job is doing.
@@ -78,6 +80,8 @@ pub enum JobPhase {
     Paused,
     /// It comes to rest to be ended.
     Ending,
+    /// The board holds its motion at rest on the path until the user decides.
+    Held,
 }
 
 impl From<JobStatus> for JobPhase {
@@ -88,6 +92,7 @@ impl From<JobStatus> for JobPhase {
             JobStatus::Pausing => Self::Pausing,
             JobStatus::Paused => Self::Paused,
             JobStatus::Ending => Self::Ending,
+            JobStatus::Held => Self::Held,
         }
     }
 }

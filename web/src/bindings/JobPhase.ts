@@ -3,4 +3,4 @@
 /**
  * What a job is doing.
  */
-export type JobPhase = "none" | "printing" | "pausing" | "paused" | "ending";
+export type JobPhase = "none" | "printing" | "pausing" | "paused" | "ending" | "held";

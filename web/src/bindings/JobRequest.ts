@@ -11,4 +11,12 @@ confirmed_lines: Array<number>,
 /**
  * Confirm all of them.
  */
-confirm_all: boolean, };
+confirm_all: boolean, 
+/**
+ * The print's own number, with which a journal is kept: any that no other print has.
+ */
+journal: number | null, 
+/**
+ * The line with which the job begins, paused; `null`: with its file.
+ */
+start_line: number | null, };

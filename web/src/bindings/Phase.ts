@@ -3,4 +3,4 @@
 /**
  * How far a connection is.
  */
-export type Phase = "identifying" | "synchronising" | "restarting" | "configuring" | "ready" | "shutdown" | "failed";
+export type Phase = "identifying" | "synchronising" | "restarting" | "configuring" | "holding" | "ready" | "shutdown" | "failed";

@@ -21,4 +21,8 @@ target_c: Celsius,
 /**
  * The share of time that it is on.
  */
-duty: number, };
+duty: number, 
+/**
+ * The board has lowered it, or switched it off, because it was out of touch with its host.
+ */
+standby: boolean, };

@@ -40,7 +40,11 @@ target_c: Celsius,
 /**
  * The share of time that it is on.
  */
-duty: number, } | { "type": "homed", 
+duty: number, 
+/**
+ * The board has lowered it, or switched it off, because it was out of touch with its host.
+ */
+standby: boolean, } | { "type": "homed", 
 /**
  * 0, 1, 2 for X, Y, Z.
  */
@@ -64,7 +68,11 @@ text: string, } | { "type": "notice",
 /**
  * What and where.
  */
-finding: Finding, } | { "type": "paused" } | { "type": "resumed" } | { "type": "job-done" } | { "type": "job-cancelled" } | { "type": "error", 
+finding: Finding, } | { "type": "paused" } | { "type": "held", 
+/**
+ * Why.
+ */
+error: PrinterError, } | { "type": "resumed" } | { "type": "job-done" } | { "type": "job-cancelled" } | { "type": "error", 
 /**
  * What.
  */

@@ -54,4 +54,12 @@ length_mm: Mm,
 /**
  * How fast.
  */
-speed_mm_s: MmPerS, } | { "type": "motors-off" } | { "type": "pause" } | { "type": "resume" } | { "type": "cancel" } | { "type": "emergency-stop" } | { "type": "firmware-restart" };
+speed_mm_s: MmPerS, } | { "type": "set-position", 
+/**
+ * Which one.
+ */
+axis: JogAxis, 
+/**
+ * Where.
+ */
+position_mm: Mm, } | { "type": "motors-off" } | { "type": "pause" } | { "type": "resume" } | { "type": "cancel" } | { "type": "emergency-stop" } | { "type": "firmware-restart" };

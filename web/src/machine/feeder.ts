@@ -56,6 +56,11 @@ export class Feeder {
     return fed;
   }
 
+  /** How much of the file itself (packed, where it is) has been read. */
+  get bytesRead(): number {
+    return this.#chunks.bytesRead;
+  }
+
   /** Whether the session wants bytes that are not here yet: time must not pass for it meanwhile. */
   get isBehind(): boolean {
     return !this.#ended && this.#waiting.length === 0 && this.#session.jobWants() > 0;

@@ -50,9 +50,11 @@ export class LockstepLoop {
     while (!this.#stopped) {
       if (this.#machine.isBehind) await this.#machine.catchUp();
       if (this.#stopped) return;
+      const began = this.#realNow();
       const rest = this.#slice();
       if (rest > 0) await this.#rest(rest);
       else await breath();
+      this.#machine.woke((this.#realNow() - began - (SLICE_MS + rest) / 1000) as Seconds);
     }
   }
 
@@ -87,7 +89,7 @@ export class LockstepLoop {
   #attend(): number {
     const bytes = this.#machine.poll(this.#printer.now());
     if (bytes.byteLength > 0) this.#printer.write(bytes);
-    return this.#machine.session.wake();
+    return this.#machine.wake(this.#printer.now());
   }
 
   #rest(ms: number): Promise<void> {
@@ -97,11 +99,7 @@ export class LockstepLoop {
         this.#wakeUp = undefined;
         resolve();
       };
-      const due = this.#realNow() + ms / 1000;
-      const timer = setTimeout(() => {
-        this.#machine.woke((this.#realNow() - due) as Seconds);
-        end();
-      }, ms);
+      const timer = setTimeout(end, ms);
       this.#wakeUp = end;
     });
   }

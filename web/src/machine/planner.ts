@@ -1,15 +1,17 @@
 // The planner's session and virtual printer for the machine worker: the generated WebAssembly behind the page's types.
 // The one place that knows the planner's messages about machines.
 import type { JobRequest } from '../bindings/JobRequest';
+import type { JournalView } from '../bindings/JournalView';
 import type { Snapshot as PlannerSnapshot } from '../bindings/Snapshot';
 import type { UiEvent } from '../bindings/UiEvent';
 import type { UiRequest } from '../bindings/UiRequest';
 import type { VirtualState } from '../bindings/VirtualState';
-import initialise, { PrinterSession, VirtualPrinter } from '../bindings/wasm/planner_wasm.js';
+import initialise, { PrinterSession, read_journal, VirtualPrinter } from '../bindings/wasm/planner_wasm.js';
 import { inWords, plannerTrouble } from '../planner_error';
+import { NO_LINE_ERRORS } from '../transport/transport';
 import { celsius, mm, type Seconds, seconds, share } from '../units';
 import type { Axis, ConfirmedLines, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
-import type { Session, SessionSnapshot, SimulatedPrinter } from './session';
+import type { JournalSummary, Session, SessionSnapshot, SimulatedPrinter } from './session';
 
 /** Speeds of moves by hand, mm/s; the machine's own limits hold besides. */
 const JOG_SPEED: Record<Axis, number> = { X: 100, Y: 100, Z: 10 };
@@ -23,6 +25,8 @@ export interface Planner {
   /** For the printer that `powerUp` makes from the same file and board. */
   openVirtualSession(config: string, board: string, now: Seconds): Session;
   powerUp(config: string, board: string, seed: number, faults: string): SimulatedPrinter;
+  /** Null where it cannot be read. `held` is what a session's `heldPrint` gave. */
+  readJournal(journal: Uint8Array, held: number | null): JournalSummary | null;
   /** The planner's error, or null where something else was thrown. */
   asTrouble(error: unknown): Trouble | null;
 }
@@ -34,9 +38,22 @@ export async function loadPlanner(): Promise<Planner> {
     openVirtualSession: (config, board, now) =>
       new WasmSession(PrinterSession.for_virtual_printer(config, board, now)),
     powerUp: (config, board, seed, faults) => new WasmPrinter(config, board, seed, faults),
+    readJournal: (journal, held) => {
+      const text = read_journal(journal, held ?? undefined);
+      return text === undefined ? null : fromJournal(JSON.parse(text) as JournalView);
+    },
     asTrouble: plannerTrouble,
   };
 }
+
+const fromJournal = (view: JournalView): JournalSummary => ({
+  number: view.print,
+  hasEnded: view.has_ended,
+  isHeld: view.is_held,
+  line: view.line,
+  elapsed: seconds(view.elapsed_s),
+  readableBytes: Number(view.readable_bytes),
+});
 
 /** Runs what may be refused. */
 function refusal(act: () => void): Trouble | null {
@@ -103,6 +120,8 @@ function fromEvent(event: UiEvent): MachineEvent | null {
       return { kind: 'done' };
     case 'job-cancelled':
       return { kind: 'cancelled' };
+    case 'held':
+      return { kind: 'held', trouble: inWords(event.error) };
     case 'error':
       return { kind: 'trouble', trouble: inWords(event.error) };
     case 'dropped':
@@ -126,6 +145,7 @@ function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
       temperature: celsius(heater.temperature_c),
       target: celsius(heater.target_c),
       duty: share(heater.duty),
+      isStandby: heater.standby,
     })),
     position: position && place(position),
     homed: now.homed,
@@ -143,7 +163,7 @@ function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
       bytesRetransmitted: Number(link.retransmitted_bytes),
       timeouts: Number(link.timeouts),
       roundTrip: link.round_trip_s === null ? null : seconds(link.round_trip_s),
-      lineErrors: 0,
+      lineErrors: NO_LINE_ERRORS,
     },
   };
 }
@@ -178,10 +198,27 @@ class WasmSession implements Session {
     return refusal(() => this.#inner.request(JSON.stringify(toRequest(wish)), now));
   }
 
-  startJob(confirmedLines: ConfirmedLines, now: Seconds): Trouble | null {
+  startJob(confirmedLines: ConfirmedLines, journal: number | null, now: Seconds): Trouble | null {
     const isAll = confirmedLines === 'all';
-    const request: JobRequest = { confirmed_lines: isAll ? [] : [...confirmedLines], confirm_all: isAll };
+    const request: JobRequest = {
+      confirmed_lines: isAll ? [] : [...confirmedLines],
+      confirm_all: isAll,
+      journal,
+      start_line: null,
+    };
     return refusal(() => this.#inner.start_job(JSON.stringify(request), now));
+  }
+
+  takeJournal(): string {
+    return this.#inner.take_journal();
+  }
+
+  heldPrint(): number | null {
+    return this.#inner.held_print() ?? null;
+  }
+
+  takeUp(journal: Uint8Array): Trouble | null {
+    return refusal(() => this.#inner.take_up(journal));
   }
 
   jobWants(): number {

@@ -2,6 +2,7 @@
 // Shapes only. Values that come from the planner are described here in the page's own words; machine/planner.ts
 // makes them from the planner's.
 import type { VirtualState } from '../bindings/VirtualState';
+import type { LineErrors } from '../transport/transport';
 import type { PortId } from '../transport/web_serial';
 import type { Celsius, Mm, Seconds, Share } from '../units';
 
@@ -23,6 +24,8 @@ export interface HeaterState {
   /** 0 is off. */
   readonly target: Celsius;
   readonly duty: Share;
+  /** The board has lowered it, or switched it off, because it was out of touch with the page. */
+  readonly isStandby: boolean;
 }
 
 /** The connection to the board, from the first byte on. */
@@ -31,11 +34,13 @@ export type Phase =
   | 'synchronising'
   | 'restarting'
   | 'configuring'
+  /** The board holds a print whose page is gone. */
+  | 'holding'
   | 'ready'
   | 'shutdown'
   | 'failed';
 
-export type JobStatus = 'none' | 'printing' | 'pausing' | 'paused' | 'ending';
+export type JobStatus = 'none' | 'printing' | 'pausing' | 'paused' | 'ending' | 'held';
 
 export interface LinkCounts {
   readonly bytesSent: number;
@@ -43,7 +48,7 @@ export interface LinkCounts {
   readonly bytesRetransmitted: number;
   readonly timeouts: number;
   readonly roundTrip: Seconds | null;
-  readonly lineErrors: number;
+  readonly lineErrors: LineErrors;
 }
 
 /** How late the worker's timers were since the connection began. */
@@ -84,7 +89,7 @@ export type MachineEvent =
   | { readonly kind: 'notice'; readonly line: number; readonly severity: string; readonly text: string }
   | { readonly kind: 'homed'; readonly axis: Axis; readonly position: Mm }
   | { readonly kind: 'paused' | 'resumed' | 'done' | 'cancelled' }
-  | { readonly kind: 'trouble'; readonly trouble: Trouble }
+  | { readonly kind: 'held' | 'trouble'; readonly trouble: Trouble }
   | { readonly kind: 'dropped'; readonly count: number };
 
 export type Wish =
@@ -107,11 +112,57 @@ export type PortChoice =
       readonly faults: string;
     };
 
+/** What there is to say of a print's file. */
+export interface PrintFacts {
+  readonly name: string;
+  /** From the plan; null where that is not known. */
+  readonly time: Seconds | null;
+  readonly lines: number;
+}
+
+/** A print on a real printer that was begun in this browser and has not come to its end, as far as is known. */
+export interface KeptPrint {
+  readonly id: string;
+  readonly facts: PrintFacts;
+  /** What the user calls the machine, and its file. */
+  readonly machine: { readonly name: string; readonly config: string };
+  readonly port: PortId;
+  /** The line of the last move that was seen to be made; 0 where none was. */
+  readonly line: number;
+  /** Print time then. */
+  readonly elapsed: Seconds;
+  /** When it was last heard of, in ms since 1970. */
+  readonly heardOf: number;
+  /** The size of its file. */
+  readonly fileBytes: number;
+}
+
+/** The print that the board holds, and what there is to be done about it. Nothing of all this moves anything. */
+export type HeldPrint =
+  | { readonly kind: 'looking' }
+  /** Nothing is known of it here; `trouble` says why, where that is out of order. */
+  | { readonly kind: 'unknown'; readonly trouble: Trouble | null }
+  /** The copy of its file is not there, or not whole. */
+  | { readonly kind: 'needs-file'; readonly print: KeptPrint; readonly trouble: Trouble | null }
+  /** Its plan is made again, up to where the board is. */
+  | { readonly kind: 'finding'; readonly print: KeptPrint; readonly share: Share }
+  | { readonly kind: 'refused'; readonly print: KeptPrint; readonly trouble: Trouble }
+  /** It is the session's job again, and waits for the user's word. */
+  | { readonly kind: 'held'; readonly print: KeptPrint; readonly file: Blob };
+
 /** Lines that the user wants left out; all that are not known, where there are more than can be listed. */
 export type ConfirmedLines = readonly number[] | 'all';
 
 export type ToMachine =
-  | { readonly kind: 'connect'; readonly port: PortChoice; readonly config: string }
+  | {
+      readonly kind: 'connect';
+      readonly port: PortChoice;
+      readonly config: string;
+      /** Of this one connection, among all tabs. */
+      readonly id: string;
+      /** What the user calls the machine. */
+      readonly name: string;
+    }
   | { readonly kind: 'disconnect' }
   | { readonly kind: 'wish'; readonly id: number; readonly wish: Wish }
   | {
@@ -119,7 +170,14 @@ export type ToMachine =
       readonly id: number;
       readonly file: Blob;
       readonly confirmedLines: ConfirmedLines;
+      readonly facts: PrintFacts;
     }
+  /** The file of the print that the board holds, from the user. */
+  | { readonly kind: 'held-file'; readonly file: Blob }
+  /** Nothing of this print is to be kept. */
+  | { readonly kind: 'forget'; readonly id: string }
+  /** Another tab may have changed what is kept. */
+  | { readonly kind: 'list-kept' }
   | { readonly kind: 'speed'; readonly speed: number }
   /** A snapshot has arrived: the next may be sent. */
   | { readonly kind: 'seen' }
@@ -147,6 +205,12 @@ export type FromMachine =
    */
   | { readonly kind: 'planned-speed'; readonly pairs: Float64Array<ArrayBuffer> }
   | { readonly kind: 'events'; readonly events: readonly MachineEvent[] }
+  /** Prints that were interrupted, the newest first; those that are under way are not among them. */
+  | { readonly kind: 'kept'; readonly prints: readonly KeptPrint[] }
+  /** What is kept of the present print is not enough to go on with it after this page; said once. */
+  | { readonly kind: 'not-kept'; readonly trouble: Trouble }
+  /** Null once there is nothing more to be decided. */
+  | { readonly kind: 'held-print'; readonly held: HeldPrint | null }
   /** What came of a wish or of a print's start. */
   | { readonly kind: 'answer'; readonly id: number; readonly trouble: Trouble | null }
   /** The worker's clock jumped: the computer slept, or the worker was held up. */

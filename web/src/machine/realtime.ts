@@ -18,6 +18,8 @@ export class RealTimeLoop {
   readonly #reader: ReadableStreamDefaultReader<Uint8Array<ArrayBuffer>>;
   readonly #options: LoopOptions;
   #timer: ReturnType<typeof setTimeout> | undefined;
+  /** When the session wanted to be called at the latest. */
+  #wake: Seconds | undefined;
   #stopped = false;
   #onFailure: (error: unknown) => void = () => undefined;
 
@@ -64,15 +66,13 @@ export class RealTimeLoop {
   #turn(): void {
     clearTimeout(this.#timer);
     const { machine, now } = this.#options;
+    // After a stall bytes may come before the timer.
+    if (this.#wake !== undefined) machine.woke((now() - this.#wake) as Seconds);
     const bytes = machine.poll(now());
     // Errors are told by the transport's `lost`; how much may be under way is bounded by the link's window.
     if (bytes.byteLength > 0) this.#writer.write(bytes).catch(() => undefined);
-    const wake = machine.session.wake();
-    const delay = Math.max(0, (wake - now()) * 1000);
-    this.#timer = setTimeout(() => {
-      this.#attempt(() => machine.woke((now() - wake) as Seconds));
-      this.tick();
-    }, delay);
+    this.#wake = machine.wake(now());
+    this.#timer = setTimeout(this.tick, Math.max(0, (this.#wake - now()) * 1000));
   }
 
   async stop(): Promise<void> {

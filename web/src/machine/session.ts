@@ -7,6 +7,20 @@ import type { ConfirmedLines, MachineEvent, Snapshot, Trouble, Wish } from './pr
 /** What a session knows of a snapshot; the rest is its owner's. */
 export type SessionSnapshot = Omit<Snapshot, 'wakeUps'>;
 
+/** What a print's journal says, as far as it could be read. */
+export interface JournalSummary {
+  /** The print's own number. */
+  readonly number: number;
+  readonly hasEnded: boolean;
+  /** The board that was asked about holds this very print. */
+  readonly isHeld: boolean;
+  /** The line of the last move that was seen to be made; 0 where none was. */
+  readonly line: number;
+  /** Print time then. */
+  readonly elapsed: Seconds;
+  readonly readableBytes: number;
+}
+
 export interface Session {
   receive(bytes: Uint8Array, now: Seconds): void;
   /** Bytes for the port; may be empty. */
@@ -16,7 +30,14 @@ export interface Session {
   takeEvents(): MachineEvent[];
   /** Null where the wish is being carried out. */
   wish(wish: Wish, now: Seconds): Trouble | null;
-  startJob(confirmedLines: ConfirmedLines, now: Seconds): Trouble | null;
+  /** `journal` is the print's own number, with which a journal is kept. */
+  startJob(confirmedLines: ConfirmedLines, journal: number | null, now: Seconds): Trouble | null;
+  /** What is to be added to the print's journal, and stored before the bytes of the last `poll` are sent. */
+  takeJournal(): string;
+  /** In the phase `holding`: the number that the board gives for the print it holds. */
+  heldPrint(): number | null;
+  /** In the phase `holding`: begins to make the print's plan again; its file is then fed as a job's is. */
+  takeUp(journal: Uint8Array): Trouble | null;
   /** How many bytes of the job's file may be fed now. */
   jobWants(): number;
   jobFeed(bytes: Uint8Array): void;

@@ -3,10 +3,11 @@
 import type { AnswerKind } from '../transport/answer';
 import { PortError, type PortFailureCode } from '../transport/transport';
 import type { Trouble } from './protocol';
+import type { StorageCode } from './storage';
 
 const NOTHING_MOVED = 'Nothing was sent to the printer: it did not move and no heater was switched on.';
 const ON_ITS_OWN =
-  'The printer is on its own: its board switches the heaters off within 3 seconds without orders and stops when its queue of moves is empty. It may have lost its position.';
+  'The printer is on its own. A board with Stepcast\u2019s firmware brings the head to rest on its path and lowers the nozzle to stand-by; any other board switches the heaters off within 5 seconds and stops when its queue of moves is empty, its position lost.';
 
 const trouble = (code: string, happened: string, safe: string, todo: string): Trouble => ({
   code,
@@ -20,7 +21,7 @@ const PORT: Record<PortFailureCode | 'port-unusable', readonly [string, string, 
   unplugged: [
     'The printer was unplugged, or its board switched off.',
     ON_ITS_OWN,
-    'Look at the printer first. Plug it in again and connect; a print does not start again by itself. Home before printing.',
+    'Look at the printer first. Plug it in again and connect; a print does not start again by itself.',
   ],
   'port-busy': [
     'The port could not be opened.',
@@ -64,6 +65,17 @@ export const portInUse = (): Trouble =>
     'Another tab of this browser is connected to this printer.',
     NOTHING_MOVED,
     'Go on in that tab, or disconnect there first.',
+  );
+
+/** The tab that drove a machine is gone without a word: closed, reloaded, or crashed. */
+export const driverGone = (name: string, port: 'serial' | 'virtual', wasPrinting: boolean): Trouble =>
+  trouble(
+    'driver-gone',
+    `The tab that drove ${name} is gone${wasPrinting ? ' in the middle of a print' : ''}.`,
+    port === 'serial' ? ON_ITS_OWN : 'The virtual printer was a part of that tab and is gone with it.',
+    port === 'serial'
+      ? 'Look at the printer first. This tab can take it over: connect here. A print does not start again by itself.'
+      : 'Connect a virtual printer here to begin anew.',
   );
 
 /** A file that is not being printed. */
@@ -132,7 +144,7 @@ export const stopNotSent = (reason: keyof typeof STOP_REASONS): Trouble =>
     `No emergency stop could be sent: ${STOP_REASONS[reason]}.`,
     reason === 'identifying'
       ? 'The stop is sent as soon as the board has said it. Until then nothing is known of what the printer does.'
-      : 'Nothing is known of what the printer does. A board without orders switches its heaters off within 3 seconds and stops when its queue of moves is empty.',
+      : 'Nothing is known of what the printer does. A board without orders lowers its heaters or switches them off within 5 seconds, and stops when its queue of moves is empty or before.',
     'If the printer moves or heats, cut its power now.',
   );
 
@@ -164,3 +176,53 @@ export function answerTrouble(answer: AnswerKind, code: string): Trouble | null 
   const words = ANSWERS[answer];
   return words ? trouble(code, words[0], NOTHING_MOVED, words[1]) : null;
 }
+
+const NOT_KEPT = 'The print itself is not touched; but it could not be continued after this page is gone.';
+const STORAGE: Record<StorageCode, readonly [string, string]> = {
+  unavailable: [
+    'The browser keeps no files for this page.',
+    'Open the page in an ordinary window, and allow it to store data.',
+  ],
+  full: [
+    'There is no room to keep the print.',
+    'Free space on this computer\u2019s disk, or delete old prints here.',
+  ],
+  'in-use': ['Another tab has this print open.', 'Go on in that tab, or close it.'],
+  missing: ['This print is not kept any more.', 'Start it anew from its file.'],
+  incomplete: ['The copy of the print\u2019s file is not whole.', 'Open the file again.'],
+  'too-long': ['The journal of the print has grown too long.', 'Start the print anew from its file.'],
+  broken: [
+    'The browser\u2019s storage does not work.',
+    'Reload the page. If it stays so, clear the data of this site in the browser\u2019s settings.',
+  ],
+};
+
+/** Something about a print's journal or file that could not be kept or read. */
+export function storageTrouble(code: StorageCode, error: unknown): Trouble {
+  const [happened, todo] = STORAGE[code];
+  const text = detail(error);
+  return trouble(
+    `storage-${code}`,
+    text && text !== code ? `${happened} (${text})` : happened,
+    NOT_KEPT,
+    todo,
+  );
+}
+
+/** Without the copy of the file; the journal is kept all the same. */
+export const copyMissing = (code: StorageCode): Trouble =>
+  trouble(
+    'copy-missing',
+    `The print\u2019s file could not be copied. (${code === 'full' ? 'there is no room' : STORAGE[code][0].replace(/\.$/, '')})`,
+    'The print itself is not touched. To go on with it after this page is gone, its file would have to be opened again.',
+    'Keep the file as it is until the print is done.',
+  );
+
+/** The user gave a file that cannot be the one. */
+export const otherFile = (name: string): Trouble =>
+  trouble(
+    'other-file',
+    `That is not the file that was being printed: ${name} had another size or other content.`,
+    'Nothing was sent to the printer; the board goes on holding the print.',
+    'Open the very file that the print was started with; one that was sliced again does not fit.',
+  );

@@ -3,15 +3,19 @@
 // Nothing here waits for the page. A Web Lock is held from before the port is opened to after it is closed, so that
 // one tab has a printer; a tab that holds a lock is not frozen either.
 import { ANSWER_BYTES_MAX, classify } from '../transport/answer';
-import { PortError } from '../transport/transport';
+import { NO_LINE_ERRORS, PortError } from '../transport/transport';
 import { find, openSerial } from '../transport/web_serial';
 import { type Seconds, seconds } from '../units';
+import { Archive, type PrintLog } from './archive';
+import { Broadcast } from './broadcast';
 import { Connection, Died, type Parts } from './connection';
+import { Continuation } from './continuation';
 import { LockstepLoop } from './lockstep';
-import { Machine } from './machine';
+import { type Keeping, Machine } from './machine';
 import { loadPlanner, type Planner } from './planner';
-import type { FromMachine, PortChoice, ToMachine, Trouble, Wish } from './protocol';
+import type { FromMachine, PortChoice, PrintFacts, Snapshot, ToMachine, Trouble, Wish } from './protocol';
 import { RealTimeLoop } from './realtime';
+import { PrintStore } from './storage';
 import { answerTrouble, plannerMissing, portInUse, portTrouble, stopNotSent } from './troubles';
 
 /** Errors for which the first bytes may know a better reason. */
@@ -20,15 +24,29 @@ const UNIDENTIFIED = new Set(['board-silent', 'board-unreadable', 'wrong-firmwar
 const scope = self as unknown as { postMessage(message: FromMachine, transfer: Transferable[]): void };
 const realNow = (): Seconds => seconds(performance.now() / 1000);
 
+type Connect = ToMachine & { kind: 'connect' };
+
 let planner: Planner | undefined;
+/** Prints on real printers; one on a virtual printer is gone with the page, and its printer with it. */
+let archive: Archive | undefined;
+/** Of a print that the board of the present connection holds. */
+let continuation: Continuation | undefined;
+/** What the page was last told of prints that are kept; one list after the other. */
+let listing: Promise<void> = Promise.resolve();
 let connection: Connection | undefined;
+/** What it was made with. */
+let present: Connect | undefined;
+/** Tells other tabs of the connection. */
+let broadcast: Broadcast | undefined;
 /** From before the port is opened until after it is closed. */
 let opening: { cancelled: boolean } | undefined;
 /** Whether the page shows the planned speed; outlives connections. */
 let watchesSpeed = false;
 
-const tell = (message: FromMachine): void =>
+function tell(message: FromMachine): void {
+  broadcast?.note(message);
   scope.postMessage(message, message.kind === 'planned-speed' ? [message.pairs.buffer] : []);
+}
 
 /** What the port's board said before it was identified, to judge what it is. */
 class FirstBytes {
@@ -55,28 +73,59 @@ async function withLock(name: string, body: () => Promise<Trouble | null>): Prom
   return await navigator.locks.request(name, { ifAvailable: true }, (lock) => (lock ? body() : portInUse()));
 }
 
+/** Tells other tabs of a connection, and stops its machine for them. */
+function broadcastOf({ id, name, port }: Connect, current: Connection): Broadcast {
+  return new Broadcast({
+    id,
+    name,
+    port,
+    look: () => {
+      let seen: Snapshot | null = null;
+      current.attempt(({ machine, now }) => {
+        seen = machine.look(now());
+      });
+      return seen;
+    },
+    stop: () => {
+      let trouble: Trouble | null = stopNotSent('not-open');
+      current.attempt(({ machine, now, tick }) => {
+        trouble = machine.wish({ kind: 'emergency-stop' }, now());
+        tick();
+      });
+      return trouble;
+    },
+  });
+}
+
 /** Goes on until the connection is over; returns why it is. */
-async function hold(parts: Parts): Promise<Trouble | null> {
+async function hold(message: Connect, parts: Parts): Promise<Trouble | null> {
   parts.machine.watchesSpeed = watchesSpeed;
   connection = new Connection(parts, tell);
+  present = message;
+  broadcast = broadcastOf(message, connection);
+  let trouble: Trouble | null = null;
   try {
-    return await connection.run();
+    trouble = await connection.run();
+    return trouble;
   } finally {
+    broadcast.end(trouble);
+    broadcast = undefined;
     connection = undefined;
+    present = undefined;
   }
 }
 
 async function connectSerial(
   loaded: Planner,
   choice: PortChoice & { kind: 'serial' },
-  config: string,
+  message: Connect,
 ): Promise<Trouble | null> {
   const port = find(choice.id, await navigator.serial.getPorts());
   if (!port) throw new PortError('port-gone');
   const name = `stepcast-port:${choice.id.vendor}:${choice.id.product}:${choice.id.index}`;
   return await withLock(name, async () => {
     // Before the port is touched: the machine's file may have errors.
-    const session = loaded.openSession(config, realNow());
+    const session = loaded.openSession(message.config, realNow());
     const transport = await openSerial(port, choice.baud).catch((error: unknown) => {
       session.free();
       throw error;
@@ -87,43 +136,85 @@ async function connectSerial(
       return null;
     }
     const first = new FirstBytes();
+    const prints = archiveOf(loaded);
     const machine = new Machine(
       session,
       (message) => tell(first.explain(message)),
       () => transport.lineErrors(),
+      keepingIn(prints),
     );
     const loop = new RealTimeLoop(transport, {
       machine,
       now: realNow,
       onBytes: (bytes) => first.take(bytes),
     });
-    return await hold({
+    continuation = new Continuation({
       machine,
-      now: realNow,
+      archive: prints,
+      tell: (held) => tell({ kind: 'held-print', held }),
+      tellNotKept,
+      onTakenUp: ({ facts }) => broadcast?.begins(facts),
       tick: loop.tick,
-      setSpeed: () => undefined,
-      record: null,
-      lost: transport.lost.then(portTrouble),
-      start: (onFailure) => loop.start(onFailure),
-      stop: () => loop.stop(),
     });
+    try {
+      return await hold(message, {
+        machine,
+        now: realNow,
+        tick: loop.tick,
+        setSpeed: () => undefined,
+        record: null,
+        lost: transport.lost.then(portTrouble),
+        start: (onFailure) => loop.start(onFailure),
+        stop: () => loop.stop(),
+      });
+    } finally {
+      continuation?.stop();
+      continuation = undefined;
+      await machine.logClosed();
+    }
   });
+}
+
+const archiveOf = (loaded: Planner): Archive => {
+  archive ??= new Archive(new PrintStore(), loaded.readJournal);
+  return archive;
+};
+
+const tellNotKept = (trouble: Trouble): void => tell({ kind: 'not-kept', trouble });
+
+const keepingIn = (prints: Archive): Keeping => ({
+  onEvent: (event) => continuation?.note(event),
+  onTell: () => continuation?.progress(),
+  settle: (log, isLost) => prints.settle(log, isLost).then(tellKept),
+});
+
+/** Tells the page which prints were interrupted. */
+function tellKept(): void {
+  listing = listing.then(async () => {
+    if (planner) tell({ kind: 'kept', prints: await archiveOf(planner).list() });
+  });
+}
+
+async function forget(id: string): Promise<void> {
+  if (planner) await archiveOf(planner).forget(id);
+  tellKept();
 }
 
 async function connectVirtual(
   loaded: Planner,
   choice: PortChoice & { kind: 'virtual' },
-  config: string,
+  message: Connect,
 ): Promise<Trouble | null> {
+  const { config } = message;
   // Every tab has a printer of its own; the lock only keeps the tab from being frozen.
   return await withLock(`stepcast-virtual:${crypto.randomUUID()}`, async () => {
     if (opening?.cancelled) return null;
     const printer = loaded.powerUp(config, choice.board, choice.seed, choice.faults);
     const now = (): Seconds => printer.now();
     const session = loaded.openVirtualSession(config, choice.board, now());
-    const machine = new Machine(session, tell, () => 0);
+    const machine = new Machine(session, tell, () => NO_LINE_ERRORS);
     const loop = new LockstepLoop(machine, printer, choice.speed, realNow);
-    return await hold({
+    return await hold(message, {
       machine,
       now,
       tick: loop.tick,
@@ -136,7 +227,7 @@ async function connectVirtual(
   });
 }
 
-async function connect(message: ToMachine & { kind: 'connect' }): Promise<void> {
+async function connect(message: Connect): Promise<void> {
   if (connection || opening) return;
   opening = { cancelled: false };
   try {
@@ -144,6 +235,7 @@ async function connect(message: ToMachine & { kind: 'connect' }): Promise<void> 
     // Only now, with port and lock let go of, may the page ask for the next connection.
     opening = undefined;
     tell({ kind: 'closed', trouble });
+    tellKept();
   } catch (error) {
     died(error);
   }
@@ -159,12 +251,12 @@ function uncaught(error: unknown): void {
 }
 
 /** A connection from its beginning to its end; why it ended. Rejects where the planner cannot be relied on any more. */
-async function carryOut(message: ToMachine & { kind: 'connect' }): Promise<Trouble | null> {
+async function carryOut(message: Connect): Promise<Trouble | null> {
   try {
     const loaded = await load();
     return message.port.kind === 'serial'
-      ? await connectSerial(loaded, message.port, message.config)
-      : await connectVirtual(loaded, message.port, message.config);
+      ? await connectSerial(loaded, message.port, message)
+      : await connectVirtual(loaded, message.port, message);
   } catch (error) {
     if (error instanceof Died || error instanceof WebAssembly.RuntimeError) throw error;
     return planner ? (planner.asTrouble(error) ?? portTrouble(error)) : plannerMissing(error);
@@ -190,12 +282,26 @@ function wish(id: number, wanted: Wish): void {
   tell({ kind: 'answer', id, trouble: isStop ? stopNotSent('not-open') : null });
 }
 
-async function print({ id, file, confirmedLines }: ToMachine & { kind: 'print' }): Promise<void> {
+/** Where the present connection keeps what is needed to go on with the print after this page is gone; null for nothing. */
+async function recordFor(facts: PrintFacts, file: Blob): Promise<PrintLog | null> {
+  if (!archive || present?.port.kind !== 'serial') return null;
+  const { name, config, port } = present;
+  const about = { facts, machine: { name, config }, port: port.id, fileBytes: file.size };
+  return await archive.begin(about, tellNotKept);
+}
+
+async function print({ id, file, confirmedLines, facts }: ToMachine & { kind: 'print' }): Promise<void> {
   const current = connection;
   const parts = current?.parts;
   if (!current || !parts) return tell({ kind: 'answer', id, trouble: null });
   try {
-    tell({ kind: 'answer', id, trouble: await parts.machine.print(file, confirmedLines, parts.now) });
+    const trouble = await parts.machine.print(file, confirmedLines, parts.now, async () => {
+      const log = await recordFor(facts, file);
+      if (log) archive?.copy(log, file);
+      return log;
+    });
+    if (trouble === null) broadcast?.begins(facts);
+    tell({ kind: 'answer', id, trouble });
   } catch (error) {
     current.fail(error);
   }
@@ -216,6 +322,15 @@ self.onmessage = ({ data }: MessageEvent<ToMachine>): void => {
       break;
     case 'print':
       void print(data);
+      break;
+    case 'held-file':
+      continuation?.give(data.file);
+      break;
+    case 'forget':
+      void forget(data.id);
+      break;
+    case 'list-kept':
+      tellKept();
       break;
     case 'speed':
       connection?.attempt(({ setSpeed }) => setSpeed(data.speed));
@@ -240,6 +355,9 @@ self.addEventListener('unhandledrejection', (event) => {
 });
 
 load().then(
-  () => tell({ kind: 'loaded' }),
+  () => {
+    tell({ kind: 'loaded' });
+    tellKept();
+  },
   (error: unknown) => tell({ kind: 'closed', trouble: plannerMissing(error) }),
 );

@@ -3,20 +3,25 @@ import { useSignal } from '@preact/signals';
 import type { JSX } from 'preact';
 import { useEffect } from 'preact/hooks';
 import { isPrinting } from '../state/machine';
+import { isViewing } from '../state/watched';
 import { ConnectDialog } from './connect_dialog';
 import { Console } from './console';
+import { openDialog } from './dialogs';
+import { HeldDialog } from './held_dialog';
 import { Instruments } from './instruments';
 import { Job } from './job';
 import { MachineDialog } from './machine_dialog';
 import { Motion } from './motion';
+import { Notices } from './notices';
 import { dropped } from './open_file';
 import { Asked } from './question';
 import { SettingsDialog } from './settings_dialog';
 import { Temperatures } from './temperatures';
-import { openDialog, TopBar } from './top_bar';
+import { TopBar } from './top_bar';
 import { TroubleBanner } from './trouble_banner';
 import { Tuning } from './tuning';
 import { Viewer } from './viewer';
+import { WatchedMachines } from './watched';
 
 const holdsFile = (event: DragEvent): boolean => event.dataTransfer?.types.includes('Files') ?? false;
 
@@ -55,6 +60,7 @@ export function App(): JSX.Element {
       <div class="page-head">
         <TopBar />
         <TroubleBanner />
+        <Notices />
       </div>
       <main class="layout">
         <div class="stage">
@@ -62,9 +68,14 @@ export function App(): JSX.Element {
           <Job />
         </div>
         <div class="side">
-          <Temperatures />
-          <Motion />
-          <Tuning />
+          <WatchedMachines />
+          {!isViewing.value && (
+            <>
+              <Temperatures />
+              <Motion />
+              <Tuning />
+            </>
+          )}
           <Instruments />
           <Console />
         </div>
@@ -77,6 +88,7 @@ export function App(): JSX.Element {
       {openDialog.value === 'connect' && <ConnectDialog />}
       {openDialog.value === 'machine' && <MachineDialog />}
       {openDialog.value === 'settings' && <SettingsDialog />}
+      <HeldDialog />
       <Asked />
     </>
   );

@@ -2,14 +2,18 @@
 import { signal } from '@preact/signals';
 import type { JSX } from 'preact';
 import { useEffect, useId } from 'preact/hooks';
+import type { KeptPrint } from '../machine/protocol';
+import { endedBy } from '../state/interrupted';
 import { connect, plannerFailed, plannerLoaded, refusePort } from '../state/machine';
 import { activeProfile, profiles, SHIPPED } from '../state/profiles';
 import { change, settings } from '../state/settings';
 import { identify, type PortId } from '../transport/web_serial';
+import { openDialog } from './dialogs';
+import { PanelDialog } from './emergency';
 import { faultProblem } from './faults';
 import { machineSummary } from './machine_summary';
-import { Button, Choice, Dialog, NumberField } from './parts';
-import { openDialog } from './top_bar';
+import { Button, Choice, NumberField } from './parts';
+import { ask } from './question';
 import { VirtualSpeed } from './virtual_speed';
 
 const HAS_SERIAL = 'serial' in navigator;
@@ -88,16 +92,31 @@ async function choose(): Promise<void> {
 
 async function go(): Promise<void> {
   const { connectTo, baud, speed } = settings.value;
-  const { config } = activeProfile.value;
+  const profile = activeProfile.value;
   if (connectTo === 'virtual' || !HAS_SERIAL) {
-    connect({ kind: 'virtual', board: 'rp2040', speed, seed: 1, faults: faults.value.trim() }, config);
+    connect({ kind: 'virtual', board: 'rp2040', speed, seed: 1, faults: faults.value.trim() }, profile);
   } else {
     // The worker finds the port by its place among those of its kind: that has to be its place now.
     await look();
     if (!chosen.value || openDialog.value !== 'connect') return;
-    connect({ kind: 'serial', id: identify(chosen.value, known.value), baud }, config);
+    const id = identify(chosen.value, known.value);
+    const choice = { kind: 'serial', id, baud } as const;
+    const [ended] = endedBy(id, profile.config);
+    if (ended) askWhetherToEnd(ended, () => connect(choice, profile));
+    else connect(choice, profile);
   }
   openDialog.value = null;
+}
+
+/** A board that is set up for another machine is restarted, and a print that it holds is lost by that. */
+function askWhetherToEnd({ facts, machine }: KeptPrint, act: () => void): void {
+  ask({
+    title: 'Connect with another machine file?',
+    text: `The print of ${facts.name} was interrupted; it was begun with the machine “${machine.name}”, as its file was then. If this is its printer and its board still holds the print, connecting with another machine file restarts the board and ends the print.`,
+    yes: 'Connect all the same',
+    no: 'Do not connect',
+    act,
+  });
 }
 
 function Ports(): JSX.Element {
@@ -202,7 +221,7 @@ export function ConnectDialog(): JSX.Element {
     return HAS_SERIAL ? followPorts() : undefined;
   }, []);
   return (
-    <Dialog title="Connect" onClose={() => (openDialog.value = null)}>
+    <PanelDialog title="Connect" onClose={() => (openDialog.value = null)}>
       <form
         class="stack"
         onSubmit={(event) => {
@@ -254,6 +273,6 @@ export function ConnectDialog(): JSX.Element {
           </button>
         </div>
       </form>
-    </Dialog>
+    </PanelDialog>
   );
 }

@@ -1,6 +1,6 @@
 // The file as a print: what it takes, what stands against it, and starting, pausing, ending it.
 import { computed, effect, signal } from '@preact/signals';
-import type { ComponentChildren, JSX } from 'preact';
+import type { JSX } from 'preact';
 import type { Summary } from '../preview/protocol';
 import { unconfirmed } from '../state/confirm';
 import { connection, isPrinting, isReady, job, outcome, snapshot, wish } from '../state/machine';
@@ -15,6 +15,7 @@ import {
   printShown,
   progress,
 } from '../state/print';
+import { Fact } from './facts';
 import { Findings } from './findings';
 import { Icon } from './icons';
 import { machineSummary } from './machine_summary';
@@ -49,20 +50,6 @@ function cancel(): void {
     no: 'Go on printing',
     act: () => void wish({ kind: 'cancel' }),
   });
-}
-
-interface FactProps {
-  readonly name: string;
-  readonly children: ComponentChildren;
-}
-
-function Fact({ name, children }: FactProps): JSX.Element {
-  return (
-    <div>
-      <dt>{name}</dt>
-      <dd>{children}</dd>
-    </div>
-  );
 }
 
 const metres = (length: number): string => formatNumber(length / 1000, 2);
@@ -124,6 +111,8 @@ const HEATERS = { extruder: 'nozzle', heater_bed: 'bed' } as const;
 function waiting(): string | null {
   if (job.value === 'paused')
     return 'Paused. The heaters stay on; the head can be moved by hand and goes back.';
+  if (job.value === 'held')
+    return 'Held: the head rests on its path, with no step lost. Look at the print, then resume or cancel it.';
   const heater = heatingUp.value;
   if (heater) {
     const [now, target] = [heater.temperature, heater.target].map((value) => formatNumber(value));
@@ -191,7 +180,7 @@ function Actions(): JSX.Element {
   const isBusy = state === 'pausing' || state === 'ending';
   return (
     <>
-      {state === 'paused' ? (
+      {state === 'paused' || state === 'held' ? (
         <Button
           kind="primary"
           icon="play"

@@ -19,10 +19,10 @@ import {
   saveProfile,
 } from '../state/profiles';
 import { change } from '../state/settings';
+import { openDialog } from './dialogs';
 import { PanelDialog } from './emergency';
 import { formatNumber } from './numbers';
 import { Button, download } from './parts';
-import { openDialog } from './top_bar';
 
 /** The text is checked when nothing has been typed for so long, in ms. */
 const CHECK_DELAY_MS = 300;

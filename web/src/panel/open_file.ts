@@ -5,7 +5,7 @@ import sampleUrl from '../../../samples/test-part.gcode?url';
 import { connection, trouble } from '../state/machine';
 import { openFile } from '../state/preview';
 import { importProfile } from '../state/profiles';
-import { openDialog } from './top_bar';
+import { openDialog } from './dialogs';
 
 export const ACCEPTED = '.gcode,.gco,.g,.gz,.nc,.txt,text/x.gcode';
 const MACHINE_FILE = /\.(cfg|conf)$/i;

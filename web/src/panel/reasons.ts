@@ -2,6 +2,7 @@
 import { computed } from '@preact/signals';
 import {
   connection,
+  isHolding,
   isReady,
   isShutdown,
   mayMove,
@@ -16,6 +17,7 @@ export const notReady = computed<string | null>(() => {
   if (plannerFailed.value) return 'The planner could not be loaded; reload the page.';
   if (!plannerLoaded.value) return 'The planner is still loading.';
   if (connection.value === 'closed') return 'Connect a printer first.';
+  if (isHolding.value) return 'The board holds a print: decide about that first.';
   if (isShutdown.value) return 'The board has stopped: restart it first.';
   if (snapshot.value?.phase === 'failed') return 'The connection failed: disconnect, then connect again.';
   return 'The printer is being set up.';

@@ -1,6 +1,7 @@
 // The diagnostic report: everything that somebody who helps would ask for, as text.
 import { effect } from '@preact/signals';
 import type { Snapshot } from '../machine/protocol';
+import { incidents } from '../state/incidents';
 import { entries } from '../state/log';
 import { connection, firmware, port, snapshot, trouble, virtualRecord } from '../state/machine';
 import { file, summary } from '../state/preview';
@@ -38,6 +39,7 @@ export function diagnosticReport(): string {
       trouble: trouble.value,
     }),
     section(snapshot.value ? 'Machine now' : 'Machine when last seen', last),
+    section('Stalls', incidents.value),
     section("Virtual printer's own record", virtualRecord.value),
     section('File', job),
     section('Messages', log.join('\n')),

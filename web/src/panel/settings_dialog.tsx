@@ -1,10 +1,11 @@
 // Settings: theme, presets for materials, the diagnostic report.
 import type { JSX } from 'preact';
+import { allowNotifications, canNotify } from '../state/notify';
 import { change, PRESETS_MAX, type Preset, settings, type Theme } from '../state/settings';
+import { openDialog } from './dialogs';
 import { PanelDialog } from './emergency';
 import { Button, Choice, download, NumberField } from './parts';
 import { diagnosticReport } from './report';
-import { openDialog } from './top_bar';
 
 const NOZZLE_MAX_C = 500;
 const BED_MAX_C = 200;
@@ -50,6 +51,34 @@ function PresetRow({ preset, index }: { readonly preset: Preset; readonly index:
   );
 }
 
+/** Opt-in: the browser asks the user when the box is ticked, and at no other time. */
+function NotificationChoice(): JSX.Element {
+  const isRefused = canNotify && Notification.permission === 'denied';
+  const isOn = settings.value.notifications && !isRefused;
+  const set = async (box: HTMLInputElement): Promise<void> => {
+    if (!box.checked) return change({ notifications: false });
+    // The box shows what holds, not what was wished for.
+    box.checked = await allowNotifications();
+  };
+  return (
+    <>
+      <label class="check">
+        <input
+          type="checkbox"
+          checked={isOn}
+          disabled={!canNotify || isRefused}
+          onChange={(event) => void set(event.currentTarget)}
+        />
+        Tell me when a print ends, pauses, is held or fails while this page is hidden
+      </label>
+      {isRefused && (
+        <p class="hint">The browser does not allow it: change that in its settings for this site.</p>
+      )}
+      {!canNotify && <p class="hint">This browser has no notifications for pages.</p>}
+    </>
+  );
+}
+
 export function SettingsDialog(): JSX.Element {
   const { theme, presets } = settings.value;
   const themes: readonly { readonly value: Theme; readonly text: string }[] = [
@@ -82,6 +111,8 @@ export function SettingsDialog(): JSX.Element {
             Add a preset
           </Button>
         </div>
+        <h3>Notifications</h3>
+        <NotificationChoice />
         <h3>When something is wrong</h3>
         <p class="hint">
           The report holds the machine file, the messages and counts of the connection, nothing of your prints

@@ -29,7 +29,8 @@ function apply(preset: Preset): void {
 function doing(heater: HeaterState | undefined): string {
   if (!heater) return 'Not known';
   if (!isReady.value || isStale.value) return 'Last reading';
-  const { temperature, target, duty } = heater;
+  const { temperature, target, duty, isStandby } = heater;
+  if (isStandby) return 'Stand-by';
   if (target === 0) return 'Off';
   const word = target - temperature > HEATING_BELOW_K ? 'Heating' : 'Holding';
   return `${word}, ${formatNumber(duty * 100)} %`;

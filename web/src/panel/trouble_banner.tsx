@@ -1,14 +1,36 @@
 // What went wrong, in three parts, with the action that comes next.
 import type { JSX } from 'preact';
-import { isShutdown, snapshot, trouble, wish } from '../state/machine';
+import type { Trouble } from '../machine/protocol';
+import { connection, isShutdown, snapshot, trouble, wish } from '../state/machine';
+import { mayReconnect, reconnect } from '../state/reconnect';
+import { openDialog } from './dialogs';
 import { Icon } from './icons';
 import { Button } from './parts';
+
+/** Troubles after which connecting from this tab is the way on. */
+const CONNECTABLE = new Set(['driver-gone']);
 
 function Restart(): JSX.Element | null {
   if (!isShutdown.value) return null;
   return (
     <Button kind="primary" onClick={() => void wish({ kind: 'firmware-restart' })}>
       Restart the board
+    </Button>
+  );
+}
+
+/** What may be done about it here and now; nothing of it happens by itself. */
+function WayOn({ of: { code } }: { readonly of: Trouble }): JSX.Element | null {
+  if (mayReconnect.value)
+    return (
+      <Button kind="primary" onClick={reconnect}>
+        Reconnect
+      </Button>
+    );
+  if (connection.value !== 'closed' || !CONNECTABLE.has(code)) return null;
+  return (
+    <Button kind="primary" onClick={() => (openDialog.value = 'connect')}>
+      Connect here
     </Button>
   );
 }
@@ -48,9 +70,11 @@ export function TroubleBanner(): JSX.Element | null {
             <p class="trouble-what">{current.happened}</p>
             <p>{current.safe}</p>
             <p>{current.todo}</p>
+            {mayReconnect.value && <p>The device is there again.</p>}
           </div>
           <div class="trouble-actions">
             <Restart />
+            <WayOn of={current} />
             <Button
               icon="close"
               kind="quiet"

@@ -7,13 +7,19 @@ import type {
   FromMachine,
   MachineEvent,
   PortChoice,
+  PrintFacts,
   Snapshot,
   ToMachine,
   Trouble,
   Wish,
 } from '../machine/protocol';
 import { plannerMissing, portTrouble, stopNotSent, workerDied } from '../machine/troubles';
+import { stalled } from './incidents';
+import { heldPrint, keptPrints } from './kept';
+import { forgetLineErrors, noteLineErrors } from './line_errors';
 import { note } from './log';
+import { notify, withdraw } from './notices';
+import type { Profile } from './profiles';
 
 export type ConnectionState = 'closed' | 'opening' | 'open';
 
@@ -36,6 +42,8 @@ export const isStale = signal(false);
 export const outcome = signal<'done' | 'cancelled' | 'stopped' | null>(null);
 
 export const isReady = computed(() => connection.value === 'open' && snapshot.value?.phase === 'ready');
+/** The board holds a print whose page is gone. */
+export const isHolding = computed(() => connection.value === 'open' && snapshot.value?.phase === 'holding');
 export const isShutdown = computed(() => connection.value === 'open' && snapshot.value?.phase === 'shutdown');
 export const job = computed(() => (isReady.value ? (snapshot.value?.job ?? 'none') : 'none'));
 export const isPrinting = computed(() => job.value !== 'none');
@@ -57,6 +65,8 @@ let deaths = 0;
 let lastId = 0;
 /** A print was begun since the last snapshot. */
 let isBegun = false;
+/** Why motion was held last. */
+let heldFor: Trouble | null = null;
 let newsTimer: ReturnType<typeof setTimeout> | undefined;
 const waiting = new Map<number, (answer: Answer) => void>();
 
@@ -107,6 +117,7 @@ function closed(reason: Trouble | null): void {
   connection.value = 'closed';
   port.value = null;
   snapshot.value = null;
+  heldPrint.value = null;
   plannedSpeed.value = new Float64Array();
   firmware.value = null;
   news();
@@ -117,7 +128,8 @@ function closed(reason: Trouble | null): void {
   if (wasOpen) note('info', 'Disconnected.');
 }
 
-function report(reason: Trouble): void {
+/** Tells the user. */
+export function report(reason: Trouble): void {
   trouble.value = reason;
   note('error', reason.happened);
 }
@@ -129,6 +141,7 @@ function take(message: FromMachine): void {
       break;
     case 'opened':
       connection.value = 'open';
+      forgetLineErrors();
       deaths = 0;
       news();
       trouble.value = null;
@@ -154,18 +167,31 @@ function take(message: FromMachine): void {
     case 'events':
       for (const event of message.events) happened(event);
       break;
+    case 'kept':
+      keptPrints.value = message.prints;
+      break;
+    case 'held-print':
+      if (connection.value === 'open') heldPrint.value = message.held;
+      break;
+    case 'not-kept': {
+      const { happened, safe, todo } = message.trouble;
+      note('warning', happened);
+      notify({ kind: 'not-kept', text: `${happened} ${safe} ${todo}` });
+      break;
+    }
     case 'answer': {
       waiting.get(message.id)?.(message.trouble);
       waiting.delete(message.id);
       break;
     }
     case 'gap':
-      note('warning', `The computer was held up for ${message.seconds.toFixed(1)} s.`);
+      stalled(message.seconds, isPrinting.value);
       break;
   }
 }
 
 function look(now: Snapshot): void {
+  if (now.link) noteLineErrors(now.link.lineErrors);
   const wasPrinting = isPrinting.value;
   snapshot.value = now;
   news();
@@ -179,6 +205,7 @@ const PHASES: Record<Snapshot['phase'], string> = {
   synchronising: 'Measuring the board\u2019s clock.',
   restarting: 'The board restarts.',
   configuring: 'Setting up the board.',
+  holding: 'The board holds a print whose page is gone.',
   ready: 'The printer is ready.',
   shutdown: 'The board has stopped.',
   failed: 'The connection failed.',
@@ -211,6 +238,8 @@ function happened(event: MachineEvent): void {
       note('info', 'Paused.');
       break;
     case 'resumed':
+      // What was held goes on: why it was does not stand any more.
+      if (trouble.value === heldFor) trouble.value = null;
       note('info', 'The print goes on.');
       break;
     case 'done':
@@ -218,8 +247,13 @@ function happened(event: MachineEvent): void {
       note('info', 'The print is done.');
       break;
     case 'cancelled':
+      if (trouble.value === heldFor) trouble.value = null;
       outcome.value = 'cancelled';
       note('info', 'The print was cancelled.');
+      break;
+    case 'held':
+      heldFor = event.trouble;
+      report(event.trouble);
       break;
     case 'trouble':
       report(event.trouble);
@@ -230,13 +264,25 @@ function happened(event: MachineEvent): void {
   }
 }
 
-export function connect(choice: PortChoice, config: string): void {
+/** The file of the print that the board holds, where the page has no copy of it. */
+export const giveHeldFile = (file: Blob): void => send({ kind: 'held-file', file });
+/** Nothing of an interrupted print is to be kept. */
+export const forgetPrint = (id: string): void => send({ kind: 'forget', id });
+/** Another tab may have changed which prints are kept. */
+export const lookForPrints = (): void => send({ kind: 'list-kept' });
+
+/** Of this tab's connection, the present or the last one. */
+export const connectionId = signal('');
+
+/** `name` is what the user calls the machine, `config` its file. */
+export function connect(choice: PortChoice, { name, config }: Pick<Profile, 'name' | 'config'>): void {
   if (connection.value !== 'closed') return;
   connection.value = 'opening';
+  connectionId.value = crypto.randomUUID();
   port.value = choice;
   virtualRecord.value = null;
   trouble.value = null;
-  send({ kind: 'connect', port: choice, config });
+  send({ kind: 'connect', port: choice, config, id: connectionId.value, name });
 }
 
 /** Whether `plannedSpeed` is wanted. */
@@ -271,9 +317,10 @@ export async function wish(wanted: Wish): Promise<boolean> {
   return isDone(await ask((id) => ({ kind: 'wish', id, wish: wanted })));
 }
 
-export async function print(file: Blob, confirmedLines: ConfirmedLines): Promise<boolean> {
+export async function print(file: Blob, facts: PrintFacts, confirmedLines: ConfirmedLines): Promise<boolean> {
   outcome.value = null;
-  isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, confirmedLines })));
+  withdraw('not-kept');
+  isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, facts, confirmedLines })));
   return isBegun;
 }
 

@@ -47,7 +47,8 @@ export async function printShown(): Promise<void> {
   if (!open || !found) return;
   const before = printed.value;
   printed.value = { file: open, summary: found, marks: lineMarks() };
-  if (!(await print(open.blob, consent.value))) printed.value = before;
+  const facts = { name: open.name, time: found.time, lines: found.lines };
+  if (!(await print(open.blob, facts, consent.value))) printed.value = before;
 }
 
 /** The layer in which a vertex lies, counted from 1; 0 before the first. */
@@ -108,13 +109,15 @@ export function printedVertex(): number | null {
   return job && now && isPrinting.peek() && isShown.peek() ? job.marks.vertexAt(now.line) : null;
 }
 
+const WAITING = { paused: 'Paused', held: 'Held' } as const;
 const TITLES = { done: 'Done', cancelled: 'Cancelled', stopped: 'Stopped' } as const;
 
 /** The tab's title: what a glance at the row of tabs should say. */
 export function titleOf(name: string | null, share: number | null, state: string): string {
   if (share !== null && name !== null) {
+    const word = Object.entries(WAITING).find(([kind]) => kind === state)?.[1];
     const percent = `${Math.floor(share * 100)} %`;
-    return `${state === 'paused' ? `Paused, ${percent}` : percent} – ${name} – Stepcast`;
+    return `${word ? `${word}, ${percent}` : percent} – ${name} – Stepcast`;
   }
   const word = Object.entries(TITLES).find(([kind]) => kind === state)?.[1];
   return word && name !== null ? `${word} – ${name} – Stepcast` : 'Stepcast';

@@ -27,6 +27,10 @@ export interface Settings {
   readonly extrudeSpeed: number;
   readonly showTravel: boolean;
   readonly showInstruments: boolean;
+  /** Notifications about prints while the page is hidden. */
+  readonly notifications: boolean;
+  /** The advice to pin the tab was read. */
+  readonly knowsPinning: boolean;
 }
 
 const KEY = 'stepcast-settings';
@@ -53,6 +57,8 @@ export const DEFAULTS: Settings = {
   extrudeSpeed: 3,
   showTravel: false,
   showInstruments: false,
+  notifications: false,
+  knowsPinning: false,
 };
 
 const between = (value: unknown, min: number, max: number, otherwise: number): number =>
@@ -97,6 +103,8 @@ export function readSettings(text: string | null): Settings {
     extrudeSpeed: between(stored.extrudeSpeed, 0.1, EXTRUDE_SPEED_MAX_MM_S, DEFAULTS.extrudeSpeed),
     showTravel: stored.showTravel === true,
     showInstruments: stored.showInstruments === true,
+    notifications: stored.notifications === true,
+    knowsPinning: stored.knowsPinning === true,
   };
 }
 

@@ -14,12 +14,20 @@ export class PortError extends Error {
   }
 }
 
+/** Errors on the line that were recovered from, by what the browser calls them. */
+export type LineErrorKind = 'break' | 'framing' | 'parity' | 'overrun' | 'system';
+export type LineErrors = Readonly<Record<LineErrorKind, number>>;
+
+export const NO_LINE_ERRORS: LineErrors = { break: 0, framing: 0, parity: 0, overrun: 0, system: 0 };
+
+export const allLineErrors = (errors: LineErrors): number =>
+  Object.values(errors).reduce((sum, count) => sum + count, 0);
+
 export interface Transport {
   readonly readable: ReadableStream<Uint8Array<ArrayBuffer>>;
   readonly writable: WritableStream<Uint8Array<ArrayBuffer>>;
   /** Settles once, when the other end is gone; never after `close`. */
   readonly lost: Promise<PortError>;
-  /** Errors on the line that were recovered from (framing, overrun …). */
-  lineErrors(): number;
+  lineErrors(): LineErrors;
   close(): Promise<void>;
 }

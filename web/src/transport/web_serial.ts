@@ -2,7 +2,7 @@
 //
 // A framing or overrun error ends the browser's stream, not the connection: the next stream is taken up. An unplugged
 // device rejects with NetworkError and leaves `readable` null, on a terminal even without a `disconnect` event.
-import { PortError, type Transport } from './transport';
+import { type LineErrorKind, type LineErrors, NO_LINE_ERRORS, PortError, type Transport } from './transport';
 
 /** The browser's default of 255 bytes loses data as soon as a task takes long. */
 const BUFFER_BYTES = 64 * 1024;
@@ -11,12 +11,12 @@ const ERRORS_IN_A_ROW_MAX = 50;
 /** A device that does not take its last bytes, or a system that does not let go of a port, is not waited for longer. */
 const CLOSE_MS_MAX = 500;
 /** Errors after which the browser offers a new stream at once. */
-const RECOVERABLE = new Set([
-  'BreakError',
-  'FramingError',
-  'ParityError',
-  'BufferOverrunError',
-  'UnknownError',
+const RECOVERABLE: ReadonlyMap<string, LineErrorKind> = new Map([
+  ['BreakError', 'break'],
+  ['FramingError', 'framing'],
+  ['ParityError', 'parity'],
+  ['BufferOverrunError', 'overrun'],
+  ['UnknownError', 'system'],
 ]);
 
 /** What tells a port from others in another realm: the devices' kind and which of that kind it is. */
@@ -31,6 +31,10 @@ const sameKind = (port: SerialPort, vendor: number | null, product: number | nul
   const info = port.getInfo();
   return (info.usbVendorId ?? null) === vendor && (info.usbProductId ?? null) === product;
 };
+
+/** Whether the port is of the kind of device that the identity is of. */
+export const isSameKind = (port: SerialPort, { vendor, product }: PortId): boolean =>
+  sameKind(port, vendor, product);
 
 /** How to find `port` again from a worker. */
 export function identify(port: SerialPort, all: readonly SerialPort[]): PortId {
@@ -85,7 +89,7 @@ class SerialTransport implements Transport {
   #lose: (error: PortError) => void = () => undefined;
   #reader: ReadableStreamDefaultReader<Uint8Array> | undefined;
   #writer: WritableStreamDefaultWriter<Uint8Array> | undefined;
-  #errors = 0;
+  #errors: LineErrors = NO_LINE_ERRORS;
   #inARow = 0;
   #closing = false;
 
@@ -105,7 +109,7 @@ class SerialTransport implements Transport {
     this.writable = new WritableStream({ write: (bytes) => this.#write(bytes) });
   }
 
-  lineErrors(): number {
+  lineErrors(): LineErrors {
     return this.#errors;
   }
 
@@ -139,12 +143,20 @@ class SerialTransport implements Transport {
     return undefined;
   }
 
+  #count(kind: LineErrorKind): void {
+    this.#errors = { ...this.#errors, [kind]: this.#errors[kind] + 1 };
+  }
+
   #recovers(error: unknown): boolean {
-    this.#errors += 1;
+    const kind = RECOVERABLE.get(nameOf(error));
+    if (!kind) {
+      this.#fail('unplugged', error);
+      return false;
+    }
+    this.#count(kind);
     this.#inARow += 1;
-    if (!RECOVERABLE.has(nameOf(error))) this.#fail('unplugged', error);
-    else if (this.#inARow > ERRORS_IN_A_ROW_MAX) this.#fail('port-error', error);
-    else return true;
+    if (this.#inARow <= ERRORS_IN_A_ROW_MAX) return true;
+    this.#fail('port-error', error);
     return false;
   }
 
@@ -166,7 +178,7 @@ class SerialTransport implements Transport {
       this.#writer?.releaseLock();
       this.#writer = undefined;
       // A new stream replaces one that failed; what was in it is lost, which the link repairs.
-      if (nameOf(error) === 'UnknownError') this.#errors += 1;
+      if (nameOf(error) === 'UnknownError') this.#count('system');
       else {
         this.#fail('unplugged', error);
         throw new PortError('unplugged', error);

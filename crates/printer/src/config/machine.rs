@@ -35,6 +35,9 @@ pub struct MachineConfig {
     pub square_corner_velocity: MmPerS,
     /// Share of a move that must cruise, 0..1.
     pub minimum_cruise_ratio: f64,
+    /// How long a board that regulates its heaters keeps them at stand-by when the host falls silent (an option of our
+    /// own); then they go off.
+    pub standby_time: Seconds,
     /// Top speed of Z; `max_velocity` where not given.
     pub max_z_velocity: MmPerS,
     /// Acceleration of Z; `max_accel` where not given.
@@ -65,6 +68,10 @@ pub struct FirmwareRetraction {
 const BAUD_DEFAULT: u32 = 250_000;
 const VELOCITY_MAX: f64 = 10_000.0;
 const ACCEL_MAX: f64 = 1_000_000.0;
+/// Half an hour at stand-by: time enough to come back and look.
+const STANDBY_TIME_S: f64 = 1_800.0;
+/// The most that a board takes.
+const STANDBY_TIME_MAX_S: f64 = 14_400.0;
 /// At 1 the head could not speed up at all.
 const MINIMUM_CRUISE_RATIO_MAX: f64 = 0.999_999;
 /// A week: longer means "never", which a heater must not have.
@@ -111,6 +118,8 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
         );
         cruise = Ok(ratio);
     }
+    let standby_time =
+        reader.number_or("standby_time", STANDBY_TIME_S, Range::from(0.0).to(STANDBY_TIME_MAX_S));
     let max_z_velocity = reader.optional_number("max_z_velocity", Range::above(0.0).to(VELOCITY_MAX));
     let max_z_accel = reader.optional_number("max_z_accel", Range::above(0.0).to(ACCEL_MAX));
     reader.finish();
@@ -122,6 +131,7 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
         max_accel: MmPerS2(max_accel),
         square_corner_velocity: MmPerS(corner?),
         minimum_cruise_ratio: cruise?,
+        standby_time: Seconds(standby_time?),
         // As in Klipper, the whole machine's limits hold for Z too.
         max_z_velocity: MmPerS(max_z_velocity?.unwrap_or(max_velocity).min(max_velocity)),
         max_z_accel: MmPerS2(max_z_accel?.unwrap_or(max_accel).min(max_accel)),

@@ -51,6 +51,9 @@ pub struct HeaterConfig {
     pub smooth_time: Seconds,
     /// Length of one on–off cycle of the output.
     pub pwm_cycle_time: Seconds,
+    /// What a board that regulates the heater by itself keeps it at when the host falls silent, where its target is not
+    /// lower anyway; 0 is off (an option of our own).
+    pub standby_temp: Celsius,
     /// Limits of the runaway check.
     pub verify: VerifyHeaterConfig,
 }
@@ -236,6 +239,7 @@ fn heater(
     let min = reader.number("min_temp", Range::from(ABSOLUTE_ZERO).to(TEMPERATURE_MAX));
     let max = reader.number("max_temp", Range::above(0.0).to(TEMPERATURE_MAX));
     let min_extrude = if extrudes { min_extrude_temp(reader, min, max) } else { Ok(ABSOLUTE_ZERO) };
+    let standby = standby_temp(reader, min, max, extrudes);
     let (min, max) = (min?, max?);
     if max <= min {
         return Err(reader.error("max_temp", format!("{max} must be above min_temp, which is {min}")));
@@ -254,6 +258,7 @@ fn heater(
         min_extrude_temp: Celsius(min_extrude?),
         smooth_time: Seconds(smooth_time?),
         pwm_cycle_time: Seconds(cycle?),
+        standby_temp: Celsius(standby?),
         verify: verify?,
     })
 }
@@ -268,6 +273,25 @@ fn min_extrude_temp(reader: &mut Reader<'_>, min: Checked<f64>, max: Checked<f64
     }
     let problem = format!("{limit} must lie within min_temp and max_temp, {min} to {max}");
     Err(reader.error("min_extrude_temp", problem))
+}
+
+/// A nozzle is kept below where filament runs or burns; a bed as it is, so that the part stays on it.
+fn standby_temp(
+    reader: &mut Reader<'_>,
+    min: Checked<f64>,
+    max: Checked<f64>,
+    extrudes: bool,
+) -> Checked<f64> {
+    const NOZZLE: f64 = 140.0;
+    let (min, max) = (min?, max?);
+    let default = if extrudes { NOZZLE.min(max) } else { max };
+    let standby = reader.number_or("standby_temp", default, Range::from(0.0).to(TEMPERATURE_MAX))?;
+    if standby == 0.0 || (min..=max).contains(&standby) || max <= min {
+        return Ok(standby);
+    }
+    let problem =
+        format!("{standby} must be 0, which is off, or lie within min_temp and max_temp, {min} to {max}");
+    Err(reader.error("standby_temp", problem))
 }
 
 /// `[verify_heater NAME]`, or the defaults for this kind of heater.

@@ -3,7 +3,7 @@
 use units::{Celsius, Seconds};
 
 /// Klipper counts PID gains in 255ths of full power.
-const KLIPPER_GAIN_SCALE: f64 = 255.0;
+pub(super) const KLIPPER_GAIN_SCALE: f64 = 255.0;
 
 /// Shorter smoothing would make a slope of the converter's noise, and of two samples at once a division by nothing.
 const SMOOTH_TIME_MIN_S: f64 = 0.01;

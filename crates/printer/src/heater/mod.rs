@@ -6,6 +6,7 @@
 //! The rule of this module: a fault is for good. Once anything is wrong the duty is 0 and stays 0 until the caller
 //! makes a new [`Heater`], which it does only after the user has confirmed.
 
+pub(crate) mod board;
 mod control;
 mod verify;
 

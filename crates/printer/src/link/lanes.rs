@@ -10,6 +10,7 @@ use units::Ticks;
 use wire::block::PAYLOAD_BYTES_MAX;
 
 use super::{
+    clocks::Clocks,
     message::{Lane, MOTION_LANES_MAX, Outgoing},
     window::MotionClocks,
 };
@@ -25,8 +26,8 @@ pub const IMMEDIATE_MESSAGES_MAX: usize = 8;
 /// What may be sent now.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gate {
-    /// The board's clock.
-    pub(super) clock: Ticks,
+    /// The board's clocks.
+    pub(super) clocks: Clocks,
     /// Motion that is due later than this is held back.
     pub(super) horizon: Ticks,
     /// The most message bytes in the block.
@@ -149,9 +150,9 @@ impl Lanes {
         self.control.clear();
     }
 
-    /// The earliest clock at which motion that waits is due.
-    pub(super) fn motion_due(&self) -> Option<Ticks> {
-        self.motion_fronts().map(|(_, front)| front.req_clock).min()
+    /// The clock before which no motion waits; what only goes along with it does not count.
+    pub(super) fn uncovered(&self) -> Option<Ticks> {
+        self.motion_fronts().filter(|(_, front)| front.covers).map(|(_, front)| front.req_clock).min()
     }
 
     fn motion_fronts(&self) -> impl Iterator<Item = (usize, &Outgoing)> {
@@ -172,7 +173,7 @@ impl Lanes {
         }
         for message in &self.control {
             let no_entry = message.entry_until.is_some() && draft.entries >= moves.free();
-            if message.min_clock > gate.clock || no_entry {
+            if message.min_clock > gate.clocks.hardware || no_entry {
                 draft.starved |= no_entry;
                 break;
             }
@@ -187,8 +188,12 @@ impl Lanes {
                 break;
             }
             draft.motion_taken[lane] += 1;
-            let due = draft.motion.due.map_or(message.req_clock, |due| due.min(message.req_clock));
-            draft.motion.due = Some(due);
+            let earlier =
+                |of: Option<Ticks>| Some(of.map_or(message.req_clock, |of| of.min(message.req_clock)));
+            draft.motion.due = earlier(draft.motion.due);
+            if message.covers {
+                draft.motion.uncovered = earlier(draft.motion.uncovered);
+            }
             if let Some(end) = message.entry_until {
                 draft.motion.ends[lane] = draft.motion.ends[lane].max(end);
             }
@@ -203,7 +208,7 @@ impl Lanes {
         let mut starved = false;
         for (at, lane) in self.motion.iter().enumerate() {
             let Some(message) = lane.get(draft.motion_taken[at]) else { continue };
-            if message.min_clock > gate.clock || message.req_clock > gate.horizon {
+            if message.min_clock > gate.clocks.motion || message.req_clock > gate.horizon {
                 continue;
             }
             if message.entry_until.is_some() && !entry_free {
@@ -235,17 +240,19 @@ impl Lanes {
         }
     }
 
-    /// The clock that the control lane waits for, where it lies after `now`.
-    pub(super) fn control_clock(&self, now: Ticks) -> Option<Ticks> {
-        self.control.front().map(|front| front.min_clock).filter(|&clock| clock > now)
+    /// How long the control lane waits for its clock, where that is ahead.
+    pub(super) fn until_control(&self, clocks: Clocks) -> Option<Ticks> {
+        let clock = self.control.front().map(|front| front.min_clock)?;
+        (clock > clocks.hardware).then(|| clock.saturating_sub(clocks.hardware))
     }
 
-    /// The clock at which the first of the lanes' fronts may be sent and has waited long enough for company.
-    pub(super) fn next_clock(&self, urgent_lead: Ticks) -> Option<Ticks> {
+    /// How long until the first of the lanes' fronts may be sent and has waited long enough for company.
+    pub(super) fn until_next(&self, urgent_lead: Ticks, clocks: Clocks) -> Option<Ticks> {
         let motion = self
             .motion_fronts()
-            .map(|(_, front)| front.req_clock.saturating_sub(urgent_lead).max(front.min_clock));
-        let control = self.control.front().map(|front| front.min_clock);
+            .map(|(_, front)| front.req_clock.saturating_sub(urgent_lead).max(front.min_clock))
+            .filter_map(|clock| clocks.until_motion(clock));
+        let control = self.control.front().map(|front| front.min_clock.saturating_sub(clocks.hardware));
         motion.chain(control).min()
     }
 }

@@ -5,7 +5,11 @@ use std::collections::VecDeque;
 
 use rand_pcg::{Pcg32, rand_core::Rng};
 use units::{Hertz, Seconds, Ticks};
-use wire::block::{Block, Deframer, Frame, SEQUENCE_MASK};
+use wire::{
+    block::{Block, Deframer, Frame, SEQUENCE_MASK},
+    check::BlockCheck,
+    dictionary::BlockChecks,
+};
 
 use super::Link;
 
@@ -97,6 +101,11 @@ impl Channel {
     }
 }
 
+/// The checks of a board that knows them.
+pub(super) fn checks() -> BlockChecks {
+    BlockChecks { to_board: BlockCheck::new(40), from_board: BlockCheck::new(90), starting: vec![75] }
+}
+
 /// Takes blocks in order and answers each one.
 #[derive(Debug)]
 pub(super) struct Board {
@@ -109,12 +118,32 @@ pub(super) struct Board {
     pub(super) taken: Vec<(f64, Vec<u8>)>,
     /// It answers a payload that starts with this byte at once with a message.
     pub(super) question: Option<u8>,
+    /// It checks blocks, from the first one with a check on.
+    pub(super) checks: Option<BlockChecks>,
+    pub(super) is_checking: bool,
 }
 
 impl Board {
     fn receive(&mut self, bytes: &[u8], now_s: f64, out: &mut Vec<u8>) {
-        let Self { deframer, expected, laconic, refused, taken, question } = self;
+        let Self { deframer, expected, laconic, refused, taken, question, checks, is_checking } = self;
         deframer.push(bytes, |frame| {
+            let frame = match (frame, checks.as_ref()) {
+                (Frame::Block { sequence, payload }, Some(checks)) => {
+                    match checks.to_board.open(sequence, payload) {
+                        Some(payload) => {
+                            *is_checking = true;
+                            Frame::Block { sequence, payload }
+                        }
+                        None if *is_checking => Frame::Garbage,
+                        None => frame,
+                    }
+                }
+                _ => frame,
+            };
+            let framed = |expected: u8, payload: &[u8]| match checks.as_ref().filter(|_| *is_checking) {
+                Some(checks) => checks.from_board.seal(expected, payload),
+                None => Block::new(expected, payload),
+            };
             let good = match frame {
                 Frame::Block { sequence, payload } if sequence == *expected => {
                     *expected = (*expected + 1) & SEQUENCE_MASK;
@@ -122,7 +151,7 @@ impl Board {
                         taken.push((now_s, payload.to_vec()));
                     }
                     if question.is_some() && payload.first() == question.as_ref() {
-                        out.extend(Block::new(*expected, b"answer").as_bytes());
+                        out.extend(framed(*expected, b"answer").as_bytes());
                     }
                     *refused = false;
                     true
@@ -134,7 +163,7 @@ impl Board {
                 Frame::Garbage => false,
             };
             if good || !*laconic || !*refused {
-                out.extend(Block::new(*expected, &[]).as_bytes());
+                out.extend(framed(*expected, &[]).as_bytes());
                 *refused |= !good;
             }
         });
@@ -168,6 +197,8 @@ impl Line {
                 refused: false,
                 taken: Vec::new(),
                 question: None,
+                checks: None,
+                is_checking: false,
             },
             up: Channel::new(conditions, seed, 1),
             down: Channel::new(conditions, seed, 2),
@@ -184,6 +215,13 @@ impl Line {
     /// The board says something of its own accord.
     pub(super) fn board_says(&mut self, payload: &[u8]) {
         self.down.send(Block::new(self.board.expected, payload).as_bytes(), self.now_s);
+    }
+
+    /// Both ends know the block check, once they have met.
+    pub(super) fn check(&mut self) {
+        self.board.checks = Some(checks());
+        assert!(self.link.is_connected(), "the board has been found");
+        self.link.set_checks(checks());
     }
 
     /// Lets time pass until `until_s`, or until `done` says so after something happened; `false` if it never did.

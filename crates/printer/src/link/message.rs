@@ -3,7 +3,7 @@
 use units::Ticks;
 use wire::{
     Command,
-    block::PAYLOAD_BYTES_MAX,
+    check::MESSAGE_BYTES_MAX,
     dictionary::{Dictionary, DictionaryError},
     vlq::SliceSink,
 };
@@ -20,14 +20,15 @@ pub enum Lane {
     Immediate,
     /// Ahead of motion: configuration, heaters, queries.
     Control,
-    /// What one stepper does, by its number below [`MOTION_LANES_MAX`]. Lanes are merged by [`Outgoing::due`].
+    /// What one stepper does, by its number below [`MOTION_LANES_MAX`], or something else that follows the motion
+    /// clock. Lanes are merged by [`Outgoing::due`].
     Motion(u8),
 }
 
 /// A message to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outgoing {
-    pub(super) bytes: [u8; PAYLOAD_BYTES_MAX],
+    pub(super) bytes: [u8; MESSAGE_BYTES_MAX],
     pub(super) len: u8,
     pub(super) lane: Lane,
     /// The clock by which the board must have it.
@@ -36,12 +37,14 @@ pub struct Outgoing {
     pub(super) min_clock: Ticks,
     /// The entry of the move queue that it takes comes free at this clock.
     pub(super) entry_until: Option<Ticks>,
+    /// Motion lasts until the board has it; otherwise it only goes along.
+    pub(super) covers: bool,
 }
 
 impl Outgoing {
-    /// A message of these bytes; `None` where they do not fit a block.
+    /// A message of these bytes; `None` where they do not fit a block beside its check.
     pub fn from_bytes(lane: Lane, payload: &[u8]) -> Option<Self> {
-        let mut bytes = [0; PAYLOAD_BYTES_MAX];
+        let mut bytes = [0; MESSAGE_BYTES_MAX];
         bytes.get_mut(..payload.len())?.copy_from_slice(payload);
         Some(Self::new(lane, bytes, payload.len()))
     }
@@ -52,17 +55,25 @@ impl Outgoing {
         dictionary: &Dictionary,
         command: &Command<'_>,
     ) -> Result<Self, DictionaryError> {
-        let mut bytes = [0; PAYLOAD_BYTES_MAX];
+        let mut bytes = [0; MESSAGE_BYTES_MAX];
         let mut sink = SliceSink::new(&mut bytes);
         dictionary.encode(command, &mut sink)?;
         let len = sink.len();
         // The longest command has eight integers; only responses carry strings.
-        debug_assert!(len < PAYLOAD_BYTES_MAX, "every command fits a block");
+        debug_assert!(len < MESSAGE_BYTES_MAX, "every command fits a block beside its check");
         Ok(Self::new(lane, bytes, len))
     }
 
-    const fn new(lane: Lane, bytes: [u8; PAYLOAD_BYTES_MAX], len: usize) -> Self {
-        Self { bytes, len: len as u8, lane, req_clock: Ticks(0), min_clock: Ticks(0), entry_until: None }
+    const fn new(lane: Lane, bytes: [u8; MESSAGE_BYTES_MAX], len: usize) -> Self {
+        Self {
+            bytes,
+            len: len as u8,
+            lane,
+            req_clock: Ticks(0),
+            min_clock: Ticks(0),
+            entry_until: None,
+            covers: true,
+        }
     }
 
     /// It belongs to something that happens at `clock`: the board must have it before, and gets it no earlier than
@@ -72,6 +83,13 @@ impl Outgoing {
     pub fn due(mut self, clock: Ticks) -> Self {
         self.req_clock = clock;
         self.min_clock = clock.saturating_sub(SCHEDULE_AHEAD_TICKS_MAX);
+        self
+    }
+
+    /// It goes along with the motion without being any: how far the board has motion does not depend on it.
+    #[must_use]
+    pub fn beside(mut self) -> Self {
+        self.covers = false;
         self
     }
 

@@ -6,20 +6,27 @@
 //!
 //! Units: host time in seconds of any monotonic clock, the board's clock in ticks.
 
+mod clocks;
 mod lanes;
 mod message;
 mod rtt;
 mod window;
 
 #[cfg(test)]
+mod check_tests;
+#[cfg(test)]
 mod lossy_line;
 #[cfg(test)]
 mod tests;
 
 use units::{Hertz, Seconds, Ticks};
-use wire::block::{BLOCK_BYTES_MAX, BLOCK_BYTES_MIN, Deframer, Frame};
+use wire::{
+    block::{BLOCK_BYTES_MAX, Deframer, Frame},
+    dictionary::BlockChecks,
+};
 
 pub use self::{
+    clocks::Clocks,
     lanes::{CONTROL_MESSAGES_MAX, IMMEDIATE_MESSAGES_MAX, MOTION_MESSAGES_MAX},
     message::{Lane, MOTION_LANES_MAX, Outgoing, SCHEDULE_AHEAD_TICKS_MAX},
 };
@@ -83,6 +90,10 @@ pub struct LinkStats {
     pub garbage: u64,
     /// Valid blocks with a number that the board cannot expect.
     pub absurd: u64,
+    /// Blocks that the framing took for valid and the block check did not.
+    pub unchecked: u64,
+    /// Whether the board sends none without that check.
+    pub checked: bool,
     /// The smoothed round-trip time.
     pub round_trip: Option<Seconds>,
     /// When the last valid block arrived.
@@ -105,6 +116,9 @@ struct Held {
 pub struct Link {
     deframer: Deframer,
     window: Window,
+    checks: Option<BlockChecks>,
+    /// The board has sent a block with a valid check: from then on it sends none without.
+    is_checked: bool,
     lanes: Lanes,
     moves: MoveQueue,
     receive_window: usize,
@@ -120,12 +134,20 @@ impl Default for Link {
 }
 
 impl Link {
-    /// A link that knows nothing of the board yet: it asks for the board's sequence number before it sends anything
-    /// else. Motion waits until [`set_board`](Self::set_board).
+    /// A link that knows nothing of the board yet: it asks for the board's sequence number with empty blocks before it
+    /// sends anything else. Motion waits until [`set_board`](Self::set_board).
     pub fn new() -> Self {
+        Self::greeting(&[])
+    }
+
+    /// The same, with these messages in the blocks that ask for the number. The board may take them any number of times,
+    /// and in this order before all others.
+    pub fn greeting(payload: &[u8]) -> Self {
         Self {
             deframer: Deframer::new(),
-            window: Window::new(),
+            window: Window::new(payload.to_vec()),
+            checks: None,
+            is_checked: false,
             lanes: Lanes::default(),
             moves: MoveQueue::new(0, Ticks(0)),
             receive_window: usize::MAX,
@@ -138,6 +160,13 @@ impl Link {
     /// The most unacknowledged bytes that the board has room for (`RECEIVE_WINDOW` in its dictionary).
     pub fn set_receive_window(&mut self, bytes: usize) {
         self.receive_window = bytes.max(BLOCK_BYTES_MAX);
+    }
+
+    /// The board knows the block check: from now on blocks carry it, and from the board's first one that does on, those
+    /// that do not are dropped.
+    pub fn set_checks(&mut self, checks: BlockChecks) {
+        self.window.set_check(checks.to_board);
+        self.checks = Some(checks);
     }
 
     /// The board's nominal clock and the size of its move queue. Forgets what was in that queue.
@@ -154,13 +183,28 @@ impl Link {
 
     /// Takes bytes from the port and hands on the messages in them, block by block.
     pub fn receive(&mut self, bytes: &[u8], now: Seconds, mut each: impl FnMut(Payload<'_>)) {
-        let Self { deframer, window, stats, .. } = self;
+        let Self { deframer, window, checks, is_checked, stats, .. } = self;
         stats.bytes_received += bytes.len() as u64;
         deframer.push(bytes, |frame| {
-            let Frame::Block { sequence, payload } = frame else {
+            let Frame::Block { sequence, mut payload } = frame else {
                 stats.garbage += 1;
                 return;
             };
+            if let Some(checks) = checks {
+                match checks.from_board.open(sequence, payload) {
+                    Some(messages) => (payload, *is_checked) = (messages, true),
+                    // A board that has just started checks no more, and its numbers mean nothing.
+                    None if *is_checked && payload == checks.starting => {
+                        each(Payload { bytes: payload, received: now, sent: None });
+                        return;
+                    }
+                    None if *is_checked => {
+                        stats.unchecked += 1;
+                        return;
+                    }
+                    None => {}
+                }
+            }
             stats.blocks_received += 1;
             stats.last_received = Some(now);
             let verdict = window.answer(sequence, payload.is_empty(), now.0);
@@ -205,7 +249,12 @@ impl Link {
     /// The clock before which all motion that was queued here has been acknowledged by the board: the earliest at
     /// which anything is due that waits or is on the way. `None` when there is nothing left to acknowledge.
     pub fn motion_covered(&self) -> Option<Ticks> {
-        self.window.motion_due().into_iter().chain(self.lanes.motion_due()).min()
+        self.window.uncovered().into_iter().chain(self.lanes.uncovered()).min()
+    }
+
+    /// The earliest clock at which any motion is due that has not been sent.
+    pub fn motion_waiting(&self) -> Option<Ticks> {
+        self.lanes.uncovered()
     }
 
     /// The clock of the last step of a motion lane that the board has acknowledged; zero before the first.
@@ -238,12 +287,14 @@ impl Link {
 
     /// Counts.
     pub fn stats(&self) -> LinkStats {
-        LinkStats { round_trip: self.window.round_trip.smoothed_s().map(Seconds), ..self.stats }
+        let round_trip = self.window.round_trip.smoothed_s().map(Seconds);
+        LinkStats { round_trip, checked: self.is_checked, ..self.stats }
     }
 
-    /// Appends what is to be sent now, and says when to call again if nothing arrives before. `clock_now` is the
-    /// board's clock as far as it is known.
-    pub fn poll(&mut self, now: Seconds, clock_now: Ticks, out: &mut Vec<u8>) -> Option<Seconds> {
+    /// Appends what is to be sent now, and says when to call again if nothing arrives before. `clocks` are the
+    /// board's as far as they are known: what waits in motion lanes is due by the motion clock.
+    pub fn poll(&mut self, now: Seconds, clocks: impl Into<Clocks>, out: &mut Vec<u8>) -> Option<Seconds> {
+        let clocks = clocks.into();
         let before = out.len();
         let wake = if self.window.is_adopted() {
             if let Some(resent) = self.window.resend(now.0, out) {
@@ -251,9 +302,9 @@ impl Link {
                 self.stats.timeouts += u64::from(resent.timed_out);
                 self.stats.bytes_retransmitted += resent.bytes as u64;
             }
-            self.moves.release(clock_now);
-            let held = self.send_blocks(now, clock_now, out);
-            self.next_wake(now, clock_now, held)
+            self.moves.release(clocks);
+            let held = self.send_blocks(now, clocks, out);
+            self.next_wake(now, clocks, held)
         } else {
             self.probe(now, out)
         };
@@ -272,18 +323,18 @@ impl Link {
     }
 
     /// Sends blocks while the window has room.
-    fn send_blocks(&mut self, now: Seconds, clock_now: Ticks, out: &mut Vec<u8>) -> Held {
+    fn send_blocks(&mut self, now: Seconds, clocks: Clocks, out: &mut Vec<u8>) -> Held {
         // Every turn sends a block or ends the loop, and the window bounds the blocks.
         for _ in 0..WINDOW_BLOCKS_IMMEDIATE_MAX {
             let Some((payload_bytes, immediate_only)) = self.room_on_the_line() else { break };
             let gate = Gate {
-                clock: clock_now,
-                horizon: Ticks(clock_now.0.saturating_add(self.horizon.0)),
+                clocks,
+                horizon: Ticks(clocks.motion.0.saturating_add(self.horizon.0)),
                 payload_bytes,
                 immediate_only,
             };
             let draft = self.lanes.draft(&gate, &self.moves);
-            if draft.is_empty() || !self.goes_now(&draft, clock_now) {
+            if draft.is_empty() || !self.goes_now(&draft, clocks.motion) {
                 return Held { starved: draft.starved, due: draft.motion.due, crowded: false };
             }
             // Short blocks may hold one long message. The immediate lane waits for nobody.
@@ -300,7 +351,7 @@ impl Link {
 
     /// The most message bytes for the next block, and whether only the immediate lane may send.
     fn room_on_the_line(&self) -> Option<(usize, bool)> {
-        let payload_bytes = self.window.loss.payload_bytes();
+        let payload_bytes = self.window.payload_bytes();
         let blocks = self.window.blocks();
         if blocks < self.window.loss.window_blocks() && self.has_room_for(payload_bytes) {
             Some((payload_bytes, false))
@@ -314,7 +365,7 @@ impl Link {
     /// Whether the board has room for a block with so many message bytes.
     fn has_room_for(&self, payload_bytes: usize) -> bool {
         let room = self.receive_window.saturating_sub(self.window.bytes());
-        self.window.blocks() == 0 || BLOCK_BYTES_MIN + payload_bytes <= room
+        self.window.blocks() == 0 || self.window.overhead_bytes() + payload_bytes <= room
     }
 
     /// How long before it is due motion is sent even in a block that is not full.
@@ -326,28 +377,29 @@ impl Link {
         self.horizon.saturating_sub(self.clock.ticks_in(Seconds(FILL_WAIT_S))).max(urgent)
     }
 
-    fn goes_now(&self, draft: &Draft, clock_now: Ticks) -> bool {
+    fn goes_now(&self, draft: &Draft, motion_now: Ticks) -> bool {
         let lead = self.urgent_lead(draft.starved);
         draft.full
             || draft.is_urgent()
-            || draft.motion.due.is_some_and(|due| due.saturating_sub(lead) <= clock_now)
+            || draft.motion.due.is_some_and(|due| due.saturating_sub(lead) <= motion_now)
     }
 
     /// When something is to be done, if nothing arrives before.
-    fn next_wake(&self, now: Seconds, clock_now: Ticks, held: Held) -> Option<f64> {
+    fn next_wake(&self, now: Seconds, clocks: Clocks, held: Held) -> Option<f64> {
         let resend = self.window.resend_due_s();
         if held.crowded || self.room_on_the_line().is_none() {
             return resend;
         }
         let send = if held.starved {
             let urgent = held.due.map(|due| due.saturating_sub(self.urgent_lead(true)));
-            let released = self.moves.next_release();
-            let released = released.map(|clock| clock + self.clock.ticks_in(Seconds(ENTRIES_WAIT_S)));
-            urgent.into_iter().chain(released).chain(self.lanes.control_clock(clock_now)).min()
+            let urgent = urgent.and_then(|clock| clocks.until_motion(clock));
+            let released = self.moves.next_release(clocks);
+            let released = released.map(|ahead| ahead + self.clock.ticks_in(Seconds(ENTRIES_WAIT_S)));
+            urgent.into_iter().chain(released).chain(self.lanes.until_control(clocks)).min()
         } else {
-            self.lanes.next_clock(self.urgent_lead(false))
+            self.lanes.until_next(self.urgent_lead(false), clocks)
         };
-        let send = send.map(|clock| now.0 + self.clock.duration_of(clock.saturating_sub(clock_now)).0);
+        let send = send.map(|ahead| now.0 + self.clock.duration_of(ahead).0);
         resend.into_iter().chain(send).min_by(f64::total_cmp)
     }
 }

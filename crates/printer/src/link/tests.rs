@@ -1,19 +1,19 @@
 //! The link against a board at the end of a line, good or bad, in virtual time.
 
 use proptest::prelude::*;
-use wire::block::Block;
+use wire::block::{BLOCK_BYTES_MIN, Block};
 
 use super::{
     lossy_line::{CLOCK, Conditions, Line},
     *,
 };
 
-const MESSAGE_BYTES: usize = 7;
+pub(super) const MESSAGE_BYTES: usize = 7;
 /// Messages of that size in a full block.
 const MESSAGES_IN_BLOCK: usize = 8;
 
 /// A message that says what it is: its number, its lane.
-fn message(lane: Lane, number: u32) -> Outgoing {
+pub(super) fn message(lane: Lane, number: u32) -> Outgoing {
     let mut bytes = [mark(lane); MESSAGE_BYTES];
     bytes[..4].copy_from_slice(&number.to_le_bytes());
     Outgoing::from_bytes(lane, &bytes).unwrap()
@@ -43,7 +43,7 @@ fn arrivals(line: &Line) -> Vec<(u8, u32)> {
 }
 
 /// Sends this many messages as fast as they go; gives the payload bytes a second.
-fn flood(line: &mut Line, messages: u32) -> f64 {
+pub(super) fn flood(line: &mut Line, messages: u32) -> f64 {
     let (start_s, mut queued) = (line.now_s, 0);
     let done = line.run(start_s + 300.0, |line| {
         while queued < messages && line.link.room(Lane::Control) > 0 {
@@ -160,7 +160,7 @@ proptest! {
 }
 
 /// A line whose board has been found.
-fn connected(seed: u64) -> Line {
+pub(super) fn connected(seed: u64) -> Line {
     let mut line = Line::new(Conditions::USB, seed);
     line.link.queue(message(Lane::Control, 0)).unwrap();
     assert!(line.run(1.0, |line| line.link.is_idle()));

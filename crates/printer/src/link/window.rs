@@ -14,7 +14,10 @@
 use std::collections::VecDeque;
 
 use units::Ticks;
-use wire::block::{Block, SEQUENCE_MASK, SYNC};
+use wire::{
+    block::{BLOCK_BYTES_MIN, Block, PAYLOAD_BYTES_MAX, SEQUENCE_MASK, SYNC},
+    check::BlockCheck,
+};
 
 use super::{
     MOTION_LANES_MAX,
@@ -30,14 +33,16 @@ const SEQUENCES: u64 = SEQUENCE_MASK as u64 + 1;
 /// The motion in a block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MotionClocks {
-    /// The earliest clock at which any of it is due; `None` where there is none.
+    /// The earliest clock at which any of it is due, which says when to send it; `None` where there is none.
     pub(super) due: Option<Ticks>,
+    /// The same without what only goes along with the motion: until the board has it, motion lasts so long.
+    pub(super) uncovered: Option<Ticks>,
     /// For each lane, the clock of the last step.
     pub(super) ends: [Ticks; MOTION_LANES_MAX],
 }
 
 impl MotionClocks {
-    pub(super) const NONE: Self = Self { due: None, ends: [Ticks(0); MOTION_LANES_MAX] };
+    pub(super) const NONE: Self = Self { due: None, uncovered: None, ends: [Ticks(0); MOTION_LANES_MAX] };
 }
 
 /// A block that has been sent.
@@ -81,6 +86,10 @@ pub(super) struct Verdict {
 pub(super) struct Window {
     /// The board's number is known.
     adopted: bool,
+    /// The payload of the blocks by which it is found out.
+    greeting: Vec<u8>,
+    /// The check that blocks carry once the board is known to understand it.
+    check: Option<BlockCheck>,
     probes: u32,
     probe_s: f64,
     /// The number that the board gave, while it is not settled.
@@ -113,9 +122,13 @@ pub(super) struct Window {
 }
 
 impl Window {
-    pub(super) fn new() -> Self {
+    /// Nothing sent yet. `greeting` is what the board is asked until its number is known: messages that it may take
+    /// any number of times.
+    pub(super) fn new(greeting: Vec<u8>) -> Self {
         Self {
             adopted: false,
+            greeting,
+            check: None,
             probes: 0,
             probe_s: 0.0,
             candidate: None,
@@ -138,6 +151,22 @@ impl Window {
         }
     }
 
+    /// From now on blocks carry this check.
+    pub(super) const fn set_check(&mut self, check: BlockCheck) {
+        self.check = Some(check);
+    }
+
+    /// What a block has besides its messages, in bytes.
+    pub(super) fn overhead_bytes(&self) -> usize {
+        BLOCK_BYTES_MIN + self.check.map_or(0, |check| check.len())
+    }
+
+    /// The most message bytes to put into a block.
+    pub(super) fn payload_bytes(&self) -> usize {
+        let room = PAYLOAD_BYTES_MAX - self.check.map_or(0, |check| check.len());
+        self.loss.payload_bytes().min(room)
+    }
+
     /// Whether the board's sequence number is known.
     pub(super) const fn is_adopted(&self) -> bool {
         self.adopted
@@ -158,12 +187,13 @@ impl Window {
         &self.motion_ends
     }
 
-    /// The earliest clock at which motion is due that is on the way.
-    pub(super) fn motion_due(&self) -> Option<Ticks> {
-        self.sent.iter().filter_map(|sent| sent.motion.due).min()
+    /// The clock before which no motion is on the way; what only goes along with it does not count.
+    pub(super) fn uncovered(&self) -> Option<Ticks> {
+        self.sent.iter().filter_map(|sent| sent.motion.uncovered).min()
     }
 
-    /// Asks the board for its number with an empty block, which tells it by an answer whether it is taken or refused.
+    /// Asks the board for its number with a block that does no harm, whether it is taken or refused: the number in the
+    /// empty block that answers it tells.
     ///
     /// One answer is not enough. A probe may be refused together with noise before it and be taken nevertheless: two
     /// answers with different numbers. So the number that was given is probed too. If the board is still there, it
@@ -173,7 +203,7 @@ impl Window {
         const STRIDE: u32 = 7;
         let sequence = self.candidate.unwrap_or(self.probes.wrapping_mul(STRIDE) as u8);
         out.push(SYNC);
-        out.extend_from_slice(Block::new(sequence, &[]).as_bytes());
+        out.extend_from_slice(Block::new(sequence, &self.greeting).as_bytes());
         if self.probes > 0 {
             self.round_trip.timed_out();
         }
@@ -220,7 +250,10 @@ impl Window {
         out: &mut Vec<u8>,
     ) -> usize {
         let sequence = self.expected + self.sent.len() as u64;
-        let block = Block::new(sequence as u8, payload);
+        let block = match &self.check {
+            Some(check) => check.seal(sequence as u8, payload),
+            None => Block::new(sequence as u8, payload),
+        };
         let len = block.as_bytes().len();
         out.extend_from_slice(block.as_bytes());
         self.transmitted(sequence, Some(now_s));

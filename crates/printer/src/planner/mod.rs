@@ -8,6 +8,7 @@
 mod guard;
 mod item;
 mod report;
+mod skip;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -22,6 +23,7 @@ use units::{Hertz, MmPerS, Seconds, Ticks};
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
 pub use report::{MotorReport, PLAN_CLOCK, PlanReport, PlanStream};
+pub(crate) use skip::{Skip, Skipped};
 pub use source::{SOURCE_BYTES_MAX, Source};
 
 use crate::{
@@ -77,6 +79,7 @@ pub struct Planner {
     look_ahead: LookAhead,
     generator: StepGenerator,
     position: Position,
+    clock: Hertz,
     run: Run,
     moves_pushed: u64,
     moves_planned: u64,
@@ -105,6 +108,7 @@ impl Planner {
             limits,
             generator: machine::step_generator(config, clock)?,
             position: [0.0; 4],
+            clock,
             run: Run::None,
             moves_pushed: 0,
             moves_planned: 0,
@@ -122,6 +126,11 @@ impl Planner {
     /// Where the last accepted move ends.
     pub const fn position(&self) -> Position {
         self.position
+    }
+
+    /// The clock in whose ticks step commands are.
+    pub const fn clock(&self) -> Hertz {
+        self.clock
     }
 
     /// Whether there is no run of motion.
@@ -151,6 +160,12 @@ impl Planner {
         self.guard.set_homed(axis, homed);
     }
 
+    /// Says where the machine stands, at rest. What is homed stays so.
+    pub fn stand_at(&mut self, position: Position) {
+        debug_assert!(self.is_at_rest(), "a position is only set at rest");
+        self.position = position;
+    }
+
     /// Makes a source continue from where the machine is: before its first line, and whenever another source moved. Its
     /// offsets are forgotten.
     pub fn adopt(&mut self, source: &mut Source) {
@@ -165,12 +180,6 @@ impl Planner {
         let [x, y, z, e] = self.position;
         source.interpreter.stand_at(x, y, z);
         source.e_offset = e - source.interpreter.position().e;
-    }
-
-    /// Makes a source that was interrupted go on: the machine is where it was then, but for the extruder, which has been
-    /// moved by this much filament in mm.
-    pub fn rejoin(&mut self, source: &mut Source, filament_mm: f64) {
-        source.e_offset += filament_mm;
     }
 
     /// As [`Self::adopt`], for a job, whose plan is to depend on nothing that was done before: the machine file's limits
@@ -189,12 +198,15 @@ impl Planner {
         self.is_broken
     }
 
-    /// Lets the machine come to rest after the moves that were read; [`Planned::RunEnded`] tells when.
-    pub fn finish_run(&mut self) {
-        if self.run == Run::Active {
+    /// Lets the machine come to rest after the moves that were read; [`Planned::RunEnded`] tells when. Whether that
+    /// changed anything.
+    pub fn finish_run(&mut self) -> bool {
+        let is_active = self.run == Run::Active;
+        if is_active {
             self.look_ahead.flush();
             self.run = Run::Ending;
         }
+        is_active
     }
 
     /// Forgets a barrier that has been read and not been reached.
@@ -278,7 +290,9 @@ impl Planner {
                 source::Next::Diagnostic(diagnostic) => return Ok(Planned::Notice(diagnostic)),
                 source::Next::NeedsInput => return Ok(Planned::NeedsInput),
                 source::Next::End if self.run == Run::None => return Ok(Planned::EndOfSource),
-                source::Next::End => self.finish_run(),
+                source::Next::End => {
+                    self.finish_run();
+                }
             }
         }
     }

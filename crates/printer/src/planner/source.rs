@@ -12,6 +12,7 @@ pub const SOURCE_BYTES_MAX: usize = 64 * 1024;
 #[derive(Debug)]
 pub struct Source {
     lines: Lines,
+    fed: u64,
     ended: bool,
     /// The modal state.
     pub interpreter: Interpreter,
@@ -45,6 +46,7 @@ impl Source {
     pub fn new(settings: Settings) -> Self {
         Self {
             lines: Lines::new(),
+            fed: 0,
             ended: false,
             interpreter: Interpreter::new(settings),
             actions: Vec::new(),
@@ -63,7 +65,13 @@ impl Source {
 
     /// Takes the next bytes of the stream.
     pub fn feed(&mut self, bytes: &[u8]) {
+        self.fed += bytes.len() as u64;
         self.lines.feed(bytes);
+    }
+
+    /// Bytes fed so far.
+    pub const fn fed(&self) -> u64 {
+        self.fed
     }
 
     /// Takes a text of its own, of which the first line is line 1. Everything before has been read.
@@ -125,18 +133,27 @@ impl Source {
 
     /// The next thing in the stream.
     pub(super) fn next(&mut self) -> Next {
+        // No file has so many lines.
+        self.next_before(LineNumber(u32::MAX)).unwrap_or(Next::End)
+    }
+
+    /// The next thing in the stream before a line; nothing once that line is the next.
+    pub(super) fn next_before(&mut self, until: LineNumber) -> Option<Next> {
         loop {
             if let Some(diagnostic) = self.diagnostics.pop() {
-                return Next::Diagnostic(diagnostic);
+                return Some(Next::Diagnostic(diagnostic));
             }
             if let Some(action) = self.actions.get_mut(self.next_action) {
                 self.next_action += 1;
-                return Next::Action(core::mem::replace(action, Action::WaitForMoves));
+                return Some(Next::Action(core::mem::replace(action, Action::WaitForMoves)));
             }
             self.actions.clear();
             self.next_action = 0;
+            if self.lines.next_number() >= until {
+                return None;
+            }
             let Some(line) = self.lines.next() else {
-                return if self.ended { Next::End } else { Next::NeedsInput };
+                return Some(if self.ended { Next::End } else { Next::NeedsInput });
             };
             self.line = line.number;
             self.interpreter.line(line.number, line.bytes, &mut self.actions, &mut self.diagnostics);

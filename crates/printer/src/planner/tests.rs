@@ -163,29 +163,6 @@ fn a_file_may_ask_for_less_than_the_machine_allows_but_not_for_more() {
 }
 
 #[test]
-fn two_sources_share_the_filament() {
-    let (mut planner, mut job) = planner();
-    job.feed(b"M83\nG1 X10 E1 F600\n");
-    items(&mut planner, &mut job);
-    planner.finish_run();
-    items(&mut planner, &mut job);
-    let mut console = Source::default();
-    planner.adopt(&mut console);
-    console.feed(b"M83\nG1 X50 E5 F600\n");
-    items(&mut planner, &mut console);
-    planner.finish_run();
-    items(&mut planner, &mut console);
-    assert_eq!(planner.position(), [50.0, 0.0, 0.0, 6.0]);
-    planner.push_raw_move([10.0, 0.0, 0.0, 6.0], MmPerS(50.0), LineNumber(0)).unwrap();
-    planner.rejoin(&mut job, 5.0);
-    job.feed(b"G1 X20 E1\n");
-    job.end();
-    let made = moves(&items(&mut planner, &mut job));
-    let e: Vec<[f64; 2]> = made.iter().map(|mv| [mv.from[3], mv.to[3]]).collect();
-    assert_eq!(e, [[6.0, 6.0], [6.0, 7.0]]);
-}
-
-#[test]
 fn a_refused_move_is_not_where_the_next_one_starts() {
     let (mut planner, mut source) = planner();
     source.feed(b"G1 X10 F600\nG1 X1000\nG1 Y10\n");

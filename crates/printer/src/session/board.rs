@@ -5,10 +5,14 @@
 use units::{Hertz, Seconds, Ticks};
 use wire::{Command, dictionary::Dictionary};
 
-use super::layout::Layout;
+use super::{
+    layout::Layout,
+    motion_time::{MotionReport, MotionTime},
+};
 use crate::{
     clock_sync::ClockSync,
-    link::{Lane, Link, Outgoing},
+    link::{Clocks, Lane, Link, Outgoing},
+    machine::MOTORS,
 };
 
 /// How far ahead of its clock an output is set on a link that works: several round trips …
@@ -20,8 +24,14 @@ const RUN_LEAD: Seconds = Seconds(0.25);
 /// … and on one that has been losing blocks.
 const RUN_LEAD_LOSSY: Seconds = Seconds(1.2);
 
+/// A board's word on its motion clock cannot come from further ahead than this: the clock is an estimate.
+const REPORT_SLACK: Seconds = Seconds(0.1);
+
 /// A link counts as lossy for this long after it last had to send something again.
 const LOSSY_FOR: Seconds = Seconds(30.0);
+
+/// The motion lane of the part fan, where that follows the motion clock: behind those of the motors.
+pub(super) const FAN_LANE: usize = MOTORS;
 
 /// A board that has been identified.
 #[derive(Debug)]
@@ -33,6 +43,8 @@ pub(super) struct Board {
     pub(super) adc_max: f64,
     pub(super) layout: Layout,
     pub(super) losses: Losses,
+    /// The clock of steps.
+    pub(super) motion: MotionTime,
 }
 
 /// When the link last had to send something again.
@@ -48,6 +60,28 @@ impl Board {
         self.sync.clock_at(now)
     }
 
+    /// The motion clock now, as far as it is known.
+    pub(super) fn motion_at(&self, now: Seconds) -> Ticks {
+        self.motion.at(self.clock_at(now))
+    }
+
+    /// The hardware clock of a motion clock, should motion go on at its full rate.
+    pub(super) fn hardware_of(&self, motion: Ticks, now: Seconds) -> Ticks {
+        self.motion.hardware(motion, self.clock_at(now))
+    }
+
+    /// Both clocks now.
+    pub(super) fn clocks(&self, now: Seconds) -> Clocks {
+        let hardware = self.clock_at(now);
+        Clocks { hardware, motion: self.motion.at(hardware), is_steady: self.motion.is_steady() }
+    }
+
+    /// Takes the board's word on its motion clock; its hardware clock then, if that can be.
+    pub(super) fn on_motion(&mut self, report: &MotionReport, now: Seconds) -> Option<Ticks> {
+        let slack = self.ticks(REPORT_SLACK);
+        self.motion.report(report, self.clock_at(now), slack)
+    }
+
     /// A duration in ticks of the nominal clock: what every plan is made in.
     pub(super) fn ticks(&self, duration: Seconds) -> Ticks {
         self.clock.ticks_in(duration)
@@ -59,10 +93,15 @@ impl Board {
         self.clock_at(now) + self.ticks(lead)
     }
 
-    /// The clock at which a run of motion that is to start "now" starts.
+    /// The motion clock at which the part fan changes that is to change "now": the same, where it follows that clock.
+    pub(super) fn fan_clock(&self, now: Seconds) -> Ticks {
+        self.motion.latest(self.output_clock(now))
+    }
+
+    /// The motion clock at which a run of motion that is to start "now" starts.
     pub(super) fn run_clock(&self, now: Seconds) -> Ticks {
         let lead = if self.is_lossy(now) { RUN_LEAD_LOSSY } else { RUN_LEAD };
-        self.clock_at(now) + self.ticks(lead)
+        self.motion_at(now) + self.ticks(lead)
     }
 
     fn is_lossy(&self, now: Seconds) -> bool {
@@ -85,6 +124,26 @@ impl Board {
     /// Sends a command that takes effect at a clock and holds an entry of the move queue until then.
     pub(super) fn control_at(&mut self, command: &Command<'_>, clock: Ticks) {
         self.send(Lane::Control, command, |message| message.due(clock).entry_until(clock));
+    }
+
+    /// Sets an output at a motion clock: in its place among the steps, where the board ties it to them.
+    pub(super) fn fan_at(&mut self, command: &Command<'_>, clock: Ticks) {
+        if self.layout.has_motion_clock {
+            self.send(Lane::Motion(FAN_LANE as u8), command, |message| {
+                message.due(clock).entry_until(clock).beside()
+            });
+        } else {
+            self.control_at(command, clock);
+        }
+    }
+
+    /// Asks motors how far they have come in their rows.
+    pub(super) fn ask_queues(&mut self, wanted: impl Fn(usize) -> bool) {
+        for (motor, oids) in self.layout.steppers.into_iter().enumerate() {
+            if let Some(oids) = oids.filter(|_| wanted(motor)) {
+                self.control(&Command::StepperGetQueue { oid: oids.stepper.0 });
+            }
+        }
     }
 
     /// Sends a command ahead of everything.
@@ -128,6 +187,7 @@ impl Board {
         let mut link = Link::new();
         link.set_board(profile.clock, 1000);
         let losses = Losses::default();
-        Self { link, dictionary, sync, clock: profile.clock, adc_max: 4095.0, layout, losses }
+        let motion = MotionTime::default();
+        Self { link, dictionary, sync, clock: profile.clock, adc_max: 4095.0, layout, losses, motion }
     }
 }

@@ -8,16 +8,19 @@ use wire::{
 };
 
 use super::{
+    attach::{Answer, Asking},
     board::{Board, Losses},
     event::{Event, PhaseName},
     inbox::{self, Message},
-    layout::Layout,
+    layout::{self, Layout},
+    motion_time::MotionTime,
 };
 use crate::{
     clock_sync::{ClockRequest, ClockSync},
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
-    identify::{Identify, IdentifyError},
+    identify::{Identify, IdentifyError, PIECE_BYTES},
+    journal::BoardQueue,
     link::{Lane, Link, Outgoing},
 };
 
@@ -25,8 +28,6 @@ use crate::{
 const ASK_AGAIN: Seconds = Seconds(0.25);
 /// A board that was asked to restart gets this long before it is spoken to.
 const RESTART: Seconds = Seconds(1.0);
-/// Converters' full scale where the board does not say.
-const ADC_MAX_DEFAULT: f64 = 4095.0;
 /// Eight readings are added up in 16 bits.
 const ADC_MAX_MAX: f64 = 8191.0;
 /// A board that has not taken its configuration in after this long never will.
@@ -82,9 +83,15 @@ impl Heard {
 impl Identifying {
     /// A board on a port that has just been opened.
     pub(super) fn new(now: Seconds) -> Self {
+        let bootstrap = Dictionary::bootstrap();
+        // The first question of all, asked until the board's number is known: a board that checks blocks for a host before
+        // us takes this one without a check, and asks for none from then on.
+        let question = Command::Identify { offset: 0, count: PIECE_BYTES };
+        let greeting = Outgoing::command(Lane::Control, &bootstrap, &question);
+        let link = greeting.map_or_else(|_| Link::new(), |greeting| Link::greeting(greeting.payload()));
         Self {
-            link: Link::new(),
-            bootstrap: Dictionary::bootstrap(),
+            link,
+            bootstrap,
             identify: Identify::new(),
             not_before: now,
             has_begun: true,
@@ -154,6 +161,8 @@ fn dictionary_error(error: &IdentifyError) -> PrinterError {
 enum Step {
     /// The state of the configuration and a clock that can be trusted.
     State,
+    /// Whether a board that has been set up holds a print.
+    Asking,
     /// The configuration to be taken in.
     Sent,
 }
@@ -166,6 +175,8 @@ pub(super) enum Outcome {
     Ready,
     /// The board has been set up by somebody else: it has to start anew.
     NeedsRestart,
+    /// The board has stopped on the path of a print whose host is gone.
+    Holds(BoardQueue),
     /// The board is in shutdown for this reason.
     Shutdown(u16),
 }
@@ -178,6 +189,7 @@ pub(super) struct Connecting {
     asked: Option<Seconds>,
     began: Option<Seconds>,
     config: Option<Message>,
+    asking: Asking,
 }
 
 impl Connecting {
@@ -192,7 +204,7 @@ impl Connecting {
         if !(1000.0..=1e9).contains(&clock_freq) {
             return Err(wrong("the board's CLOCK_FREQ makes no sense"));
         }
-        let adc_max = dictionary.number("ADC_MAX").unwrap_or(ADC_MAX_DEFAULT);
+        let adc_max = layout::adc_max(&dictionary);
         if !(1.0..=ADC_MAX_MAX).contains(&adc_max) {
             return Err(wrong("the board's ADC_MAX makes no sense"));
         }
@@ -215,16 +227,21 @@ impl Connecting {
             dictionary,
             layout,
             losses: Losses::default(),
+            motion: MotionTime::default(),
         };
         if let Some(window) = window {
             board.link.set_receive_window(window as usize);
         }
-        Ok((Self { board, step: Step::State, asked: None, began: None, config: None }, event))
+        if let Some(checks) = board.dictionary.block_checks() {
+            board.link.set_checks(checks);
+        }
+        let asking = Asking::default();
+        Ok((Self { board, step: Step::State, asked: None, began: None, config: None, asking }, event))
     }
 
     pub(super) const fn phase(&self) -> PhaseName {
         match self.step {
-            Step::State => PhaseName::Synchronising,
+            Step::State | Step::Asking => PhaseName::Synchronising,
             Step::Sent => PhaseName::Configuring,
         }
     }
@@ -235,7 +252,7 @@ impl Connecting {
                 Message::Clock(low) => self.board.sync.clock(low, sent, now),
                 Message::Uptime { high, low } => self.board.sync.uptime(high, low, sent, now),
                 Message::Config { .. } | Message::Shutdown { .. } => self.config = Some(message),
-                _ => {}
+                _ => self.asking.receive(message, &mut self.board, now),
             }
         }
     }
@@ -261,7 +278,14 @@ impl Connecting {
             }
             _ => {}
         }
-        let idle = self.step == Step::State || self.board.link.is_idle();
+        if self.step == Step::Asking {
+            match self.asking.poll(&mut self.board, now) {
+                Answer::Pending => {}
+                Answer::Nothing => return Ok(Outcome::NeedsRestart),
+                Answer::Holds(queue) => return Ok(Outcome::Holds(queue)),
+            }
+        }
+        let idle = self.step != Step::Sent || self.board.link.is_idle();
         if idle && self.asked.is_none_or(|asked| now - asked >= ASK_AGAIN) {
             self.asked = Some(now);
             self.board.control(&Command::GetConfig {});
@@ -279,7 +303,15 @@ impl Connecting {
         move_count: u16,
     ) -> Result<Option<Outcome>, PrinterError> {
         match self.step {
-            Step::State if is_config => Ok(Some(Outcome::NeedsRestart)),
+            Step::State if is_config => {
+                if crc != self.board.layout.crc || !self.board.layout.has_motion_clock {
+                    return Ok(Some(Outcome::NeedsRestart));
+                }
+                let clock = self.board.clock;
+                self.board.link.set_board(clock, move_count);
+                self.step = Step::Asking;
+                Ok(None)
+            }
             Step::State if self.board.sync.is_settled() => {
                 let commands = self.board.layout.commands.clone();
                 for command in &commands {
@@ -300,7 +332,7 @@ impl Connecting {
                 Ok(Some(Outcome::Ready))
             }
             Step::Sent if is_config => Err(ErrorCode::ConfigMismatch.into()),
-            Step::State | Step::Sent => Ok(None),
+            Step::State | Step::Asking | Step::Sent => Ok(None),
         }
     }
 }

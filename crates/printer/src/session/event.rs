@@ -80,24 +80,26 @@ pub enum Event {
         target: Celsius,
         /// The share of time that it is on.
         duty: f64,
+        /// The board has lowered it, or switched it off, because its host fell silent.
+        standby: bool,
     },
-    /// A run of motion starts at this clock and position.
+    /// A run of motion starts at this motion clock and position.
     RunStarted {
-        /// The board's clock.
+        /// The board's motion clock.
         at: Ticks,
         /// The machine's position, in mm.
         position: Position,
     },
-    /// A move will be made between these clocks. Told when it is planned, some seconds ahead.
+    /// A move will be made between these motion clocks. Told when it is planned, some seconds ahead.
     Move(ScheduledMove),
-    /// A run of motion ends at rest at this clock. Told when it is planned.
+    /// A run of motion ends at rest at this motion clock. Told when it is planned.
     RunEnded {
-        /// The board's clock.
+        /// The board's motion clock.
         at: Ticks,
     },
-    /// A run of motion was broken off before its end: its motors stood still at this clock at the latest.
+    /// A run of motion was broken off before its end: its motors stood still at this motion clock at the latest.
     RunBroken {
-        /// The board's clock.
+        /// The board's motion clock.
         at: Ticks,
     },
     /// An axis found its endstop: it is at this position now.
@@ -126,7 +128,10 @@ pub enum Event {
     Notice(Diagnostic),
     /// The job was paused, and the machine is at rest.
     Paused,
-    /// The job goes on.
+    /// The board has brought motion to rest on its path, and says why; it waits for [`Request::Resume`] or
+    /// [`Request::Cancel`].
+    Held(PrinterError),
+    /// The job, or what was held, goes on.
     Resumed,
     /// The job ended; all its moves have been made.
     JobDone,
@@ -152,7 +157,7 @@ impl Event {
     }
 }
 
-/// A planned move on the board's clock.
+/// A planned move on the board's motion clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduledMove {
     /// The line of the source that asked for it; 0 for moves that no line asked for (homing).
@@ -171,7 +176,7 @@ pub struct ScheduledMove {
     pub homing: bool,
 }
 
-/// How fast the toolhead is during a move: a trapezoid on the board's clock, between the move's start and its end. Zero
+/// How fast the toolhead is during a move: a trapezoid on the board's motion clock, between the move's start and its end. Zero
 /// throughout where only filament moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpeedProfile {
@@ -216,6 +221,9 @@ pub enum PhaseName {
     Restarting,
     /// The board's pins are being set up.
     Configuring,
+    /// The board holds a print whose host is gone. Whoever has its journal can take it up
+    /// ([`super::Session::take_up`]); everybody else restarts the board.
+    Holding,
     /// Ready for commands.
     Ready,
     /// The board has stopped everything and says why; a firmware restart is needed.
@@ -239,6 +247,13 @@ pub enum Request {
         /// How fast.
         speed: MmPerS,
     },
+    /// An axis, 0, 1, 2 for X, Y, Z, stands there: the user says so, and it counts as homed.
+    SetPosition {
+        /// Which.
+        axis: usize,
+        /// Where.
+        position: Mm,
+    },
     /// A heater's target; 0 is off.
     SetTemperature(Heater, Celsius),
     /// The part fan's speed, 0 ..= 1.
@@ -249,9 +264,10 @@ pub enum Request {
     SetFlowFactor(f64),
     /// The job comes to rest and waits; a wait for a temperature is broken off and taken up again afterwards.
     Pause,
-    /// The job goes on from where it paused.
+    /// The job goes on from where it paused, or what is held with its next step.
     Resume,
-    /// The job comes to rest and ends; heaters and fan go off. Without a job, what was typed is.
+    /// The job comes to rest and ends; heaters and fan go off. Without a job, what was typed is. What is held ends where
+    /// it stands.
     Cancel,
     /// Everything stops at once.
     EmergencyStop,

@@ -1,7 +1,8 @@
 //! The part fan: its orders at the clocks of the plan, never closer together than the board should have to keep.
 //!
 //! Each order holds an entry of the board's move queue until its clock, so a file with thousands of them in a row must
-//! not send them all. Knows nothing of G-code. Speeds are 0 ..= 1.
+//! not send them all. Its clocks are those of steps: where the board can hold its motion, the fan waits with it. Knows
+//! nothing of G-code. Speeds are 0 ..= 1.
 
 use units::{Seconds, Ticks};
 use wire::Command;
@@ -38,9 +39,9 @@ impl Fan {
     pub(super) fn set(&mut self, speed: f64, at: Option<Ticks>, board: &mut Board, now: Seconds) {
         self.speed = if speed > 0.0 { speed.min(1.0) } else { 0.0 };
         let on_ticks = self.output.on_ticks(self.config.duty(speed));
-        let clock = at.unwrap_or_default().max(board.output_clock(now));
+        let clock = at.unwrap_or_default().max(board.fan_clock(now));
         if let Some((due, waiting)) = self.waiting.take_if(|(due, _)| *due <= clock) {
-            self.send(due.max(board.output_clock(now)), waiting, board);
+            self.send(due.max(board.fan_clock(now)), waiting, board);
         }
         let earliest = self.last.map_or(Ticks(0), |(last, _)| last + board.ticks(ORDER_GAP));
         if clock >= earliest {
@@ -52,11 +53,17 @@ impl Fan {
 
     /// Sends an order that has waited for long enough.
     pub(super) fn poll(&mut self, board: &mut Board, now: Seconds) {
-        let clock = board.output_clock(now);
+        let clock = board.fan_clock(now);
         let soon = clock + board.ticks(ORDER_GAP);
         if let Some((due, on_ticks)) = self.waiting.take_if(|(due, _)| *due <= soon) {
             self.send(due.max(clock), on_ticks, board);
         }
+    }
+
+    /// The board has dropped what waited for its time: what the fan does now, nobody knows.
+    pub(super) const fn forget_orders(&mut self) {
+        self.last = None;
+        self.waiting = None;
     }
 
     fn send(&mut self, clock: Ticks, on_ticks: u32, board: &mut Board) {
@@ -65,6 +72,6 @@ impl Fan {
         }
         self.last = Some((clock, on_ticks));
         let oid = self.output.oid.0;
-        board.control_at(&Command::QueueDigitalOut { oid, clock: clock.low().0, on_ticks }, clock);
+        board.fan_at(&Command::QueueDigitalOut { oid, clock: clock.low().0, on_ticks }, clock);
     }
 }

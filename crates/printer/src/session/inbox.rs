@@ -6,7 +6,8 @@ use wire::{
     dictionary::{Dictionary, Received},
 };
 
-use crate::link::Link;
+use super::{board_heater::HeaterReport, motion_time::MotionReport};
+use crate::{journal::MotorQueue, link::Link};
 
 /// A message from the board, without borrowed bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +19,9 @@ pub(super) enum Message {
     Endstop { oid: u8, homing: bool, pin_value: bool },
     Trigger { oid: u8, can_trigger: bool, reason: u8 },
     Analog { oid: u8, next_clock: Clock32, sum: u16 },
+    Motion(MotionReport),
+    Queue { oid: u8, job: u32, queue: MotorQueue },
+    Heater(HeaterReport),
     Shutdown { reason: u16 },
     Starting,
 }
@@ -67,6 +71,27 @@ fn message(response: &Response<'_>) -> Option<Message> {
             Message::Shutdown { reason: static_string_id }
         }
         Response::Starting {} => Message::Starting,
-        Response::Stats { .. } | Response::IdentifyResponse { .. } => return None,
+        Response::MotionState { clock, motion, rate, state, reason } => {
+            Message::Motion(MotionReport::new(clock, motion, rate, state, reason))
+        }
+        Response::StepperQueue { oid, job, received, done, left, next, dir, pos, crc } => Message::Queue {
+            oid,
+            job,
+            queue: MotorQueue {
+                received,
+                done,
+                left,
+                next: Clock32(next),
+                dir: dir != 0,
+                position: pos,
+                crc,
+            },
+        },
+        Response::HeaterState { oid, target, power, state, .. } => {
+            Message::Heater(HeaterReport::new(oid, target, power, state))
+        }
+        Response::Stats { .. } | Response::IdentifyResponse { .. } | Response::BlockChecked { .. } => {
+            return None;
+        }
     })
 }

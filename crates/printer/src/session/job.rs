@@ -7,7 +7,7 @@ use units::{MmPerS, Seconds};
 
 use crate::{
     error::PrinterError,
-    planner::{Position, Source},
+    planner::{Planner, Position, Skip, Source},
 };
 
 /// Going back to where a print was paused is done at this speed.
@@ -22,6 +22,12 @@ pub struct JobOptions {
     pub confirmed_lines: BTreeSet<u32>,
     /// Confirm all of them.
     pub confirm_all: bool,
+    /// The print's own number, with which a journal is kept ([`crate::journal`]). Any that no other print has; the next
+    /// million belong to it too.
+    pub journal: Option<u32>,
+    /// The job begins with this line, as if those before it had been made: it is paused, until the machine is homed and
+    /// the user resumes it.
+    pub start_line: Option<u32>,
 }
 
 /// What a job is doing.
@@ -30,7 +36,11 @@ pub(super) enum JobState {
     Printing,
     /// Coming to rest; then it waits.
     Pausing,
+    /// Reading up to the line with which it begins; then it is paused.
+    Skipping,
     Paused,
+    /// Going back to where it was paused.
+    Returning,
     /// Coming to rest; then it is over because the user said so …
     Cancelling,
     /// … or because of this.
@@ -50,15 +60,32 @@ pub enum JobStatus {
     Paused,
     /// It comes to rest to be ended.
     Ending,
+    /// The board holds its motion at rest on the path, whatever it belongs to: it goes on, or is ended, at the user's
+    /// word.
+    Held,
 }
 
-/// How the machine stood when a job was paused.
-#[derive(Clone, Copy, Debug)]
+/// A job that was paused, and how the machine stood then.
+#[derive(Debug)]
 pub(super) struct Paused {
+    /// Plans the job and nothing else, so that its plan does not depend on what is done meanwhile.
+    pub(super) planner: Box<Planner>,
     pub(super) position: Position,
     pub(super) homed: [bool; 3],
     /// The nozzle was hot enough.
     pub(super) could_extrude: bool,
+    /// What the heaters were set to.
+    pub(super) targets: Vec<(gcode::Heater, units::Celsius)>,
+    /// Where it begins in the middle of its file.
+    pub(super) start: Option<Start>,
+}
+
+/// How a job begins that does not begin with its file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    /// Ways lead over what has been printed at this height, in mm.
+    pub(super) clear_z: f64,
+    pub(super) fan: f64,
 }
 
 /// A print.
@@ -68,6 +95,8 @@ pub(super) struct Job {
     pub(super) options: JobOptions,
     pub(super) state: JobState,
     pub(super) paused: Option<Paused>,
+    /// Reads up to the line with which it begins.
+    pub(super) skip: Option<Skip>,
     pub(super) told: Seconds,
     /// It has made a move.
     pub(super) has_moved: bool,
@@ -82,6 +111,7 @@ impl Job {
             options,
             state: JobState::Printing,
             paused: None,
+            skip: None,
             told: Seconds(f64::NEG_INFINITY),
             has_moved: false,
             leaves_hot: false,
@@ -90,7 +120,7 @@ impl Job {
 
     pub(super) const fn status(&self) -> JobStatus {
         match self.state {
-            JobState::Printing => JobStatus::Printing,
+            JobState::Printing | JobState::Skipping | JobState::Returning => JobStatus::Printing,
             JobState::Pausing => JobStatus::Pausing,
             JobState::Paused => JobStatus::Paused,
             JobState::Cancelling | JobState::Failing(_) => JobStatus::Ending,

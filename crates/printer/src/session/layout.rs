@@ -5,13 +5,14 @@
 use units::{Oid, Seconds};
 use wire::{
     Command,
-    dictionary::{Dictionary, DictionaryError},
+    dictionary::{BOARD_HEATERS, Dictionary, DictionaryError, MOTION_CLOCK},
     messages::CommandKind,
 };
 
 use crate::{
     config::{HeaterConfig, PinSpec, PrinterConfig, Pull},
     error::{ErrorCode, PrinterError},
+    heater::{self, board::Objects},
     machine::MOTORS,
 };
 
@@ -44,8 +45,41 @@ const NEEDED: &[CommandKind] = &[
     CommandKind::UpdateDigitalOut,
 ];
 
-/// How long a heater stays on without being refreshed, as the board itself watches it.
-pub(crate) const HEATER_MAX_DURATION: Seconds = Seconds(3.0);
+/// What a board needs besides so that its motion can be held: the host's lease on motion, and what ends a hold.
+const MOTION_NEEDED: &[CommandKind] = &[
+    CommandKind::MotionLease,
+    CommandKind::MotionEnd,
+    CommandKind::MotionResume,
+    CommandKind::MotionGetState,
+    CommandKind::MotionDrop,
+    CommandKind::MotionTie,
+    CommandKind::StepperGetQueue,
+];
+/// The version of the motion clock that is spoken here.
+const MOTION_VERSION: f64 = 1.0;
+
+/// What a board needs besides so that it regulates heaters by itself.
+const HEATERS_NEEDED: &[CommandKind] = &[
+    CommandKind::ConfigHeater,
+    CommandKind::HeaterPoint,
+    CommandKind::HeaterPid,
+    CommandKind::HeaterWatermark,
+    CommandKind::HeaterCheck,
+    CommandKind::HeaterSet,
+    CommandKind::HeaterLease,
+    CommandKind::HeaterGetState,
+];
+/// The version of the board's heaters that is spoken here.
+const HEATERS_VERSION: f64 = 1.0;
+
+/// How many readings of a sensor are added up.
+pub(super) const SAMPLE_COUNT: u8 = 8;
+
+/// How long a heater stays on without being refreshed by its loop, wherever that runs.
+const HEATER_MAX_DURATION: Seconds = Seconds(3.0);
+
+/// A converter's full scale where the board does not say.
+const ADC_MAX_DEFAULT: f64 = 4095.0;
 
 /// A motor's objects.
 #[derive(Clone, Copy, Debug)]
@@ -87,6 +121,8 @@ pub(super) struct EndstopOids {
 pub(super) struct HeaterOids {
     pub(super) sensor: Oid,
     pub(super) power: Output,
+    /// Where the board itself regulates it.
+    pub(super) board: Option<Oid>,
 }
 
 /// Which object is what.
@@ -97,6 +133,8 @@ pub(super) struct Layout {
     pub(super) extruder: Option<HeaterOids>,
     pub(super) bed: Option<HeaterOids>,
     pub(super) fan: Option<Output>,
+    /// Whether the board can hold its motion (docs/motion-clock.md). The part fan then follows the motion clock.
+    pub(super) has_motion_clock: bool,
     /// The commands that set all this up, without `finalize_config`.
     pub(super) commands: Vec<Command<'static>>,
     /// The CRC-32 of those commands: a board that was set up by the same says so.
@@ -108,6 +146,8 @@ struct Builder<'a> {
     clock_freq: f64,
     commands: Vec<Command<'static>>,
     oids: u8,
+    /// Full scale of the converter, where the board regulates its heaters.
+    heaters_adc_max: Option<f64>,
 }
 
 impl Builder<'_> {
@@ -157,7 +197,13 @@ impl Builder<'_> {
         let sensor = self.oid();
         self.commands.push(Command::ConfigAnalogIn { oid: sensor.0, pin });
         let power = self.output(&config.heater_pin, Some(config.pwm_cycle_time), HEATER_MAX_DURATION)?;
-        Ok(HeaterOids { sensor, power })
+        let board = self.heaters_adc_max.and_then(|adc_max| {
+            let objects = Objects { heater: self.oids, sensor: sensor.0, output: power.oid.0 };
+            let commands = heater::board::commands(config, objects, adc_max, SAMPLE_COUNT)?;
+            self.commands.extend(commands);
+            Some(self.oid())
+        });
+        Ok(HeaterOids { sensor, power, board })
     }
 
     fn endstop(&mut self, pin: &PinSpec) -> Result<EndstopOids, PrinterError> {
@@ -192,6 +238,11 @@ impl Builder<'_> {
     }
 }
 
+/// Full scale of the board's converter.
+pub(super) fn adc_max(dictionary: &Dictionary) -> f64 {
+    dictionary.number("ADC_MAX").unwrap_or(ADC_MAX_DEFAULT)
+}
+
 impl Layout {
     /// Lays a machine out on a board.
     pub(super) fn new(
@@ -202,7 +253,12 @@ impl Layout {
         let wrong =
             |error: DictionaryError| PrinterError::new(ErrorCode::DictionaryIncomplete, error.to_string());
         dictionary.require(NEEDED).map_err(wrong)?;
-        let mut builder = Builder { dictionary, clock_freq, commands: Vec::new(), oids: 0 };
+        let has_motion_clock = dictionary.number(MOTION_CLOCK) == Some(MOTION_VERSION)
+            && dictionary.require(MOTION_NEEDED).is_ok();
+        let has_heaters = dictionary.number(BOARD_HEATERS) == Some(HEATERS_VERSION)
+            && dictionary.require(HEATERS_NEEDED).is_ok();
+        let heaters_adc_max = has_heaters.then(|| adc_max(dictionary));
+        let mut builder = Builder { dictionary, clock_freq, commands: Vec::new(), oids: 0, heaters_adc_max };
         let mut steppers = [None; MOTORS];
         let [x, y, z] = &config.steppers;
         let endstops = [
@@ -223,6 +279,9 @@ impl Layout {
             Some(fan) => Some(builder.output(&fan.pin, Some(fan.cycle_time), Seconds::ZERO)?),
             None => None,
         };
+        if let Some(fan) = fan.filter(|_| has_motion_clock) {
+            builder.commands.push(Command::MotionTie { oid: fan.oid.0 });
+        }
         let mut commands = vec![Command::AllocateOids { count: builder.oids }];
         commands.append(&mut builder.commands);
         let mut bytes = Vec::new();
@@ -230,7 +289,7 @@ impl Layout {
             dictionary.encode(command, &mut bytes).map_err(wrong)?;
         }
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes);
-        Ok(Self { steppers, endstops, extruder, bed, fan, commands, crc })
+        Ok(Self { steppers, endstops, extruder, bed, fan, has_motion_clock, commands, crc })
     }
 }
 
@@ -251,9 +310,13 @@ mod tests {
     #[test]
     fn the_sample_machine_is_laid_out_as_its_file_says() {
         let layout = lay_out(SAMPLE).unwrap();
-        let text: Vec<String> = layout.commands.iter().map(|command| format!("{command:?}")).collect();
+        // The points of the sensors' curves are many.
+        let is_point = |command: &&Command<'_>| matches!(command, Command::HeaterPoint { .. });
+        assert!((4..=64).contains(&layout.commands.iter().filter(is_point).count()));
+        let others = layout.commands.iter().filter(|command| !is_point(command));
+        let text: Vec<String> = others.map(|command| format!("{command:?}")).collect();
         let expected = [
-            "AllocateOids { count: 19 }",
+            "AllocateOids { count: 21 }",
             "ConfigEndstop { oid: 0, pin: 20, pull_up: 1 }",
             "ConfigTrsync { oid: 1 }",
             "ConfigEndstop { oid: 2, pin: 21, pull_up: 1 }",
@@ -271,14 +334,32 @@ mod tests {
             "ConfigAnalogIn { oid: 14, pin: 26 }",
             "ConfigDigitalOut { oid: 15, pin: 16, value: 0, default_value: 0, max_duration: 36000000 }",
             "SetDigitalOutPwmCycle { oid: 15, cycle_ticks: 1200000 }",
-            "ConfigAnalogIn { oid: 16, pin: 27 }",
-            "ConfigDigitalOut { oid: 17, pin: 17, value: 0, default_value: 0, max_duration: 36000000 }",
-            "SetDigitalOutPwmCycle { oid: 17, cycle_ticks: 1200000 }",
-            "ConfigDigitalOut { oid: 18, pin: 18, value: 0, default_value: 0, max_duration: 0 }",
-            "SetDigitalOutPwmCycle { oid: 18, cycle_ticks: 120000 }",
+            "ConfigHeater { oid: 16, adc_oid: 14, out_oid: 15, sample_count: 8, max_power: 4096, smooth: 1000 }",
+            "HeaterPid { oid: 16, kp: 1460605, ki: 71056, kd: 7500402 }",
+            "HeaterCheck { oid: 16, max_error: 120000, gain_time: 20000, hysteresis: 5000, gain: 2000 }",
+            "ConfigAnalogIn { oid: 17, pin: 27 }",
+            "ConfigDigitalOut { oid: 18, pin: 17, value: 0, default_value: 0, max_duration: 36000000 }",
+            "SetDigitalOutPwmCycle { oid: 18, cycle_ticks: 1200000 }",
+            "ConfigHeater { oid: 19, adc_oid: 17, out_oid: 18, sample_count: 8, max_power: 4096, smooth: 1000 }",
+            "HeaterWatermark { oid: 19, delta: 2000 }",
+            "HeaterCheck { oid: 19, max_error: 120000, gain_time: 60000, hysteresis: 5000, gain: 2000 }",
+            "ConfigDigitalOut { oid: 20, pin: 18, value: 0, default_value: 0, max_duration: 0 }",
+            "SetDigitalOutPwmCycle { oid: 20, cycle_ticks: 120000 }",
+            "MotionTie { oid: 20 }",
         ];
         assert_eq!(text, expected, "{text:#?}");
         assert!(layout.steppers[1].is_some_and(|oids| oids.invert_dir));
+    }
+
+    #[test]
+    fn plain_boards_are_told_nothing_of_a_motion_clock_nor_of_heaters() {
+        let config = crate::config::parse(SAMPLE).0.expect("a machine");
+        let board = BoardProfile::rp2040().plain();
+        let dictionary = Dictionary::parse(&board.description().compressed()).expect("a dictionary");
+        let layout = Layout::new(&config, &dictionary, f64::from(board.clock.0)).unwrap();
+        assert!(!layout.has_motion_clock);
+        assert!(layout.commands.iter().all(|command| !command.kind().is_extension()));
+        assert!(layout.extruder.is_some_and(|oids| oids.board.is_none()));
     }
 
     #[test]

@@ -7,15 +7,20 @@
 //! Nothing here restarts a print by itself: after a shutdown or a lost link the job is gone, and only the owner can
 //! start another.
 
+mod attach;
 mod board;
+mod board_heater;
 mod connect;
 mod console;
+mod diary;
 mod event;
 mod fan;
 mod homing;
 mod inbox;
 mod job;
 mod layout;
+mod lease;
+mod motion_time;
 mod ready;
 mod request;
 mod stream;
@@ -31,6 +36,7 @@ pub use event::{EVENTS_MAX, Event, PhaseName, Request, ScheduledMove, SpeedProfi
 pub use job::{JobOptions, JobStatus};
 
 use self::{
+    attach::Holding,
     board::Board,
     connect::{Connecting, Identifying, Outcome},
     event::Events,
@@ -40,6 +46,7 @@ use self::{
 use crate::{
     config::PrinterConfig,
     error::{Ended, ErrorCode, PrinterError},
+    journal::{Continuation, Journal, PENDING_BYTES_MAX},
     link::LinkStats,
 };
 
@@ -52,6 +59,7 @@ const RESTARTS_MAX: u32 = 5;
 enum Stage {
     Identifying(Box<Identifying>),
     Connecting(Box<Connecting>),
+    Holding(Box<Holding>),
     Ready(Box<Ready>),
     /// The board has stopped; it is still listened to, and a restart can be sent.
     Shutdown(Box<Board>),
@@ -73,6 +81,8 @@ pub struct Session {
     restart_wanted: bool,
     /// Bytes that are still to be sent to a board that restarts.
     parting: Vec<u8>,
+    /// What is to be added to the job's journal.
+    journal: String,
 }
 
 impl Session {
@@ -90,6 +100,7 @@ impl Session {
             restarts_left: RESTARTS_MAX,
             restart_wanted: false,
             parting: Vec::new(),
+            journal: String::new(),
         }
     }
 
@@ -98,6 +109,7 @@ impl Session {
         match &self.stage {
             Stage::Identifying(identifying) => identifying.phase(),
             Stage::Connecting(connecting) => connecting.phase(),
+            Stage::Holding(_) => PhaseName::Holding,
             Stage::Ready(_) => PhaseName::Ready,
             Stage::Shutdown(_) => PhaseName::Shutdown,
             Stage::Failed => PhaseName::Failed,
@@ -127,7 +139,18 @@ impl Session {
     fn collect_events(&mut self) {
         if let Stage::Ready(ready) = &mut self.stage {
             self.events.append(&mut ready.events);
+            // An owner that takes none keeps no journal, and the writer has a bound of its own.
+            if self.journal.len() < PENDING_BYTES_MAX {
+                self.journal.push_str(&ready.diary.take());
+            }
         }
+    }
+
+    /// What is to be added to the journal of the present print. It must have been stored before the bytes are sent that
+    /// [`Self::poll`] gave at the same time, and before anything else is asked of the session.
+    pub fn take_journal(&mut self) -> String {
+        self.collect_events();
+        core::mem::take(&mut self.journal)
     }
 
     fn enter(&mut self, stage: Stage) {
@@ -173,6 +196,11 @@ impl Session {
                 Err(error) => self.fail(error),
             },
             Stage::Connecting(connecting) => connecting.receive(bytes, now),
+            Stage::Holding(holding) => {
+                if let Err(failure) = holding.receive(bytes, now) {
+                    self.on_failure(failure, now);
+                }
+            }
             Stage::Ready(ready) => {
                 if let Err(failure) = ready.receive(bytes, now) {
                     self.on_failure(failure, now);
@@ -192,20 +220,24 @@ impl Session {
     }
 
     fn on_failure(&mut self, failure: Failure, now: Seconds) {
-        let Stage::Ready(mut ready) = self.take_stage() else { return };
-        self.events.append(&mut ready.events);
+        let mut board = match self.take_stage() {
+            Stage::Ready(ready) => ready.board,
+            Stage::Holding(holding) => holding.board,
+            stage => {
+                self.stage = stage;
+                return;
+            }
+        };
         match failure {
             Failure::Stop(error) => {
-                let mut board = ready.board;
                 board.link.forget_all();
                 board.immediate(&Command::EmergencyStop {});
                 self.stopped(board, error.ending(Ended::Everything));
             }
-            Failure::Shutdown(error) => self.stopped(ready.board, error),
+            Failure::Shutdown(error) => self.stopped(board, error),
             Failure::Lost(error) => {
                 if error.code == ErrorCode::LinkLost {
                     // Perhaps only the way back is cut.
-                    let mut board = ready.board;
                     self.part(&mut board, &Command::EmergencyStop {}, now);
                 }
                 self.fail(error);
@@ -235,6 +267,17 @@ impl Session {
                     now + IDLE_WAKE
                 }
             },
+            Stage::Holding(holding) => match holding.poll(&mut self.events, now, out) {
+                Ok(Err(wake)) => wake,
+                Ok(Ok((taken, options))) => {
+                    self.taken_up(taken, options, now);
+                    now
+                }
+                Err(failure) => {
+                    self.on_failure(failure, now);
+                    now
+                }
+            },
             Stage::Ready(ready) => match ready.poll(now, out) {
                 Ok(wake) => wake,
                 Err(failure) => {
@@ -261,6 +304,7 @@ impl Session {
         let Connecting { board, .. } = *connecting;
         match *outcome {
             Outcome::Pending(_) => {}
+            Outcome::Holds(queue) => self.enter(Stage::Holding(Box::new(Holding::new(board, queue)))),
             Outcome::Ready => match Ready::new(self.config.clone(), board, now) {
                 Ok(ready) => {
                     self.restarts_left = RESTARTS_MAX;
@@ -283,6 +327,35 @@ impl Session {
         }
     }
 
+    /// The number of the print that a board holds whose host is gone: [`Journal::knows`] whose it is.
+    pub fn held_print(&self) -> Option<u32> {
+        match &self.stage {
+            Stage::Holding(holding) => Some(holding.queue.id),
+            _ => None,
+        }
+    }
+
+    /// Takes up the print that the board holds: its file is then fed from the beginning, as a job's is, and the plan is made
+    /// again up to where the board is. That moves nothing. Then the print is held in this session, and goes on or is
+    /// ended at the user's word. What does not fit comes as an error, and the board goes on holding.
+    pub fn take_up(&mut self, journal: &Journal) -> Result<(), PrinterError> {
+        let Stage::Holding(holding) = &mut self.stage else { return Err(ErrorCode::NoJob.into()) };
+        holding.begin(journal, &self.config)
+    }
+
+    /// The plan is where the board is.
+    fn taken_up(&mut self, taken: Continuation, options: JobOptions, now: Seconds) {
+        let Stage::Holding(holding) = self.take_stage() else { return };
+        let Holding { board, queue, .. } = *holding;
+        match Ready::take_up(self.config.clone(), board, taken, &queue, options, now) {
+            Ok(ready) => self.enter(Stage::Ready(Box::new(ready))),
+            Err((board, error)) => {
+                self.stage = Stage::Holding(Box::new(Holding::new(*board, queue)));
+                self.events.push(Event::Error(error));
+            }
+        }
+    }
+
     /// The owner wants the board to start anew.
     fn restart_wanted(&mut self, now: Seconds) {
         let board = match self.take_stage() {
@@ -293,6 +366,7 @@ impl Session {
                 Some(ready.board)
             }
             Stage::Shutdown(board) => Some(*board),
+            Stage::Holding(holding) => Some(holding.board),
             Stage::Connecting(connecting) => Some(connecting.board),
             Stage::Identifying(_) | Stage::Failed => None,
         };
@@ -323,16 +397,18 @@ impl Session {
     pub fn link_stats(&self) -> Option<LinkStats> {
         match &self.stage {
             Stage::Connecting(connecting) => Some(connecting.board.link.stats()),
+            Stage::Holding(holding) => Some(holding.board.link.stats()),
             Stage::Ready(ready) => Some(ready.board.link.stats()),
             Stage::Shutdown(board) => Some(board.link.stats()),
             Stage::Identifying(_) | Stage::Failed => None,
         }
     }
 
-    /// The board's clock now, as far as it is known.
-    pub fn board_clock(&self, now: Seconds) -> Option<Ticks> {
+    /// The board's motion clock now, as far as it is known: that of moves and runs. It is the board's clock, less the
+    /// time that motion was held.
+    pub fn motion_clock(&self, now: Seconds) -> Option<Ticks> {
         match &self.stage {
-            Stage::Ready(ready) => Some(ready.clock_at(now)),
+            Stage::Ready(ready) => Some(ready.board.motion_at(now)),
             _ => None,
         }
     }

@@ -1,6 +1,6 @@
 //! What an owner may ask of a session, and when it is refused.
 
-use units::Seconds;
+use units::{Mm, Seconds};
 use wire::Command;
 
 use super::{
@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     error::{Ended, ErrorCode, PrinterError},
+    journal::Input,
     machine,
     planner::Position,
 };
@@ -37,14 +38,21 @@ impl Session {
             }
             Request::SetTemperature(heater, target) => {
                 ready.thermal.set_target(heater, target, &mut ready.board, now)?;
+                ready.diary.target(heater, target.0);
             }
-            Request::SetFan(speed) => ready.thermal.set_fan(speed, None, &mut ready.board, now),
+            Request::SetFan(speed) => {
+                ready.thermal.set_fan(speed, None, &mut ready.board, now);
+                ready.diary.input(Input::Fan(speed));
+            }
             Request::SetSpeedFactor(factor) => {
                 ready.sources().for_each(|source| source.interpreter.set_speed_factor(factor));
+                ready.diary.input(Input::Speed(factor));
             }
             Request::SetFlowFactor(factor) => {
                 ready.sources().for_each(|source| source.interpreter.set_flow_factor(factor));
+                ready.diary.input(Input::Flow(factor));
             }
+            Request::SetPosition { axis, position } => ready.set_position(axis, position)?,
             Request::Pause => ready.pause(now)?,
             Request::Resume => ready.resume(now)?,
             Request::Cancel => ready.cancel(now)?,
@@ -66,6 +74,10 @@ impl Session {
                 board.link.forget_all();
                 board.immediate(&Command::EmergencyStop {});
                 self.stopped(board, error);
+            }
+            Stage::Holding(holding) => {
+                self.stage = Stage::Holding(holding);
+                self.on_failure(Failure::Stop(error), now);
             }
             // It has stopped, but who presses that button does not trust it.
             Stage::Shutdown(mut board) => {
@@ -91,7 +103,11 @@ impl Session {
             return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
         }
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
-        ready.planner.begin_job(&mut job.source);
+        match job.options.start_line {
+            Some(line) if line > 1 => ready.begin_at(&mut job, line)?,
+            _ => ready.planner.begin_job(&mut job.source),
+        }
+        ready.diary.begin(&job.options, &ready.config, &ready.planner, now);
         ready.last_active = now;
         ready.stream.reset_elapsed();
         job.told = now;
@@ -103,6 +119,7 @@ impl Session {
     pub fn job_wants(&self) -> usize {
         match &self.stage {
             Stage::Ready(ready) => ready.job.as_ref().map_or(0, |job| job.source.wants()),
+            Stage::Holding(holding) => holding.wants(),
             _ => 0,
         }
     }
@@ -110,6 +127,12 @@ impl Session {
     /// The next bytes of the job's file, no more than [`Self::job_wants`]: more than that ends the job, since they would
     /// have to be dropped or kept without bound.
     pub fn job_feed(&mut self, bytes: &[u8]) {
+        if let Stage::Holding(holding) = &mut self.stage {
+            let fits = bytes.len() <= holding.wants();
+            if let Some(replay) = holding.replay().filter(|_| fits) {
+                replay.feed(bytes);
+            }
+        }
         if let Stage::Ready(ready) = &mut self.stage
             && let Some(job) = &mut ready.job
         {
@@ -125,6 +148,11 @@ impl Session {
 
     /// The job's file has ended.
     pub fn job_end(&mut self) {
+        if let Stage::Holding(holding) = &mut self.stage
+            && let Some(replay) = holding.replay()
+        {
+            replay.end();
+        }
         if let Stage::Ready(ready) = &mut self.stage
             && let Some(job) = &mut ready.job
         {
@@ -192,6 +220,24 @@ impl Ready {
             JobStatus::None | JobStatus::Paused => Ok(&mut self.console),
             _ => Err(ErrorCode::BusyPrinting.into()),
         }
+    }
+
+    /// Takes the user's word for where an axis stands.
+    fn set_position(&mut self, axis: usize, position: Mm) -> Result<(), PrinterError> {
+        self.idle_console()?;
+        if self.is_console_busy() {
+            return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
+        }
+        let limits =
+            self.config.steppers.get(axis).map(|stepper| (stepper.position_min, stepper.position_max));
+        if !limits.is_some_and(|(min, max)| (min..=max).contains(&position)) {
+            let detail = format!("an axis cannot stand at {position}");
+            return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail));
+        }
+        self.diary.other_run(&mut self.board);
+        self.planner.set_axis(axis, position.0, true);
+        self.planner.correct(&mut self.console.source);
+        Ok(())
     }
 
     fn sources(&mut self) -> impl Iterator<Item = &mut crate::planner::Source> {

@@ -1,7 +1,8 @@
-//! The stream of motion: step commands from the planner onto the board's clock, just far enough ahead.
+//! The stream of motion: step commands from the planner onto the board's motion clock, just far enough ahead.
 //!
 //! A run of motion gets a start clock when its first move is planned; from then on every step is that clock plus the
-//! plan's own ticks, so that the same run gives the same intervals whenever it starts. Knows nothing of G-code.
+//! plan's own ticks, so that the same run gives the same intervals whenever it starts. All clocks here are the board's
+//! motion clock, unless they say otherwise: a hold delays everything alike. Knows nothing of G-code.
 
 use std::collections::VecDeque;
 
@@ -11,7 +12,12 @@ use units::{Seconds, Ticks};
 use wire::Command;
 
 use super::{board::Board, event::ScheduledMove};
-use crate::{link::Lane, machine::MOTORS, planner::TimedAction};
+use crate::{
+    journal::Row,
+    link::Lane,
+    machine::MOTORS,
+    planner::{Position, TimedAction},
+};
 
 /// How much motion is planned and sent ahead of the board's clock.
 pub(super) const HORIZON: Seconds = Seconds(4.0);
@@ -45,6 +51,20 @@ pub(super) struct Run {
     pub(super) homing: bool,
 }
 
+/// A run that was begun by a host that is gone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TakenUp {
+    pub(super) start: Ticks,
+    pub(super) end: Option<Ticks>,
+    /// Where the board counts each motor to be.
+    pub(super) counts: [i32; MOTORS],
+    /// The same at the start of the run, and the machine's position there.
+    pub(super) counts_at_start: [i32; MOTORS],
+    pub(super) position_at_start: Position,
+    /// Print time of the runs before.
+    pub(super) elapsed: Seconds,
+}
+
 /// What has to be said to a motor before its next steps.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pending {
@@ -59,8 +79,17 @@ pub(super) struct MotionStream {
     pending: [Pending; MOTORS],
     timeline: VecDeque<(Ticks, Due)>,
     enabled: [bool; MOTORS],
-    /// The clock at which each motor's driver was last switched: the next switch must come later.
+    /// The hardware clock at which each motor's driver was last switched: the next switch must come later.
     switched: [Ticks; MOTORS],
+    /// The direction of each motor's next steps, as planned …
+    planned_forward: [bool; MOTORS],
+    /// … and the level of its direction pin for them: high counts up.
+    forward: [bool; MOTORS],
+    /// Where the board counts each motor to be once all of its steps have been made.
+    counts: [i32; MOTORS],
+    /// The same at the start of the run, and the machine's position there.
+    counts_at_start: [i32; MOTORS],
+    position_at_start: Position,
     /// Print time of the runs that have ended.
     elapsed: Seconds,
 }
@@ -102,23 +131,30 @@ impl MotionStream {
     }
 
     /// A run starts as soon as the link allows.
-    pub(super) fn start_run(&mut self, board: &Board, now: Seconds, homing: bool) -> Run {
+    pub(super) fn start_run(&mut self, position: Position, board: &Board, now: Seconds, homing: bool) -> Run {
         // A driver that has just been switched off is first on again.
         let switched = self.switched.iter().fold(Ticks(0), |last, &clock| last.max(clock));
-        let start = board.run_clock(now).max(switched + board.ticks(ENABLE_LEAD * 2.0));
+        let ready = switched.saturating_sub(board.clock_at(now)) + board.ticks(ENABLE_LEAD * 2.0);
+        let start = board.run_clock(now).max(board.motion_at(now) + ready);
         let run = Run { start, end: None, homing };
         self.run = Some(run);
+        self.counts_at_start = self.counts;
+        self.position_at_start = position;
         self.pending = [Pending { reset: true, forward: None }; MOTORS];
         run
     }
 
     /// Switches a motor's driver on before its first step at `at`.
-    fn enable(&mut self, motor: usize, at: Ticks, board: &mut Board) {
+    fn enable(&mut self, motor: usize, at: Ticks, board: &mut Board, now: Seconds) {
         if self.enabled[motor] {
             return;
         }
         self.enabled[motor] = true;
-        let clock = at.saturating_sub(board.ticks(ENABLE_LEAD));
+        let mut clock = board.hardware_of(at, now).saturating_sub(board.ticks(ENABLE_LEAD));
+        if !board.motion.is_steady() {
+            // Held where the motor is about to make its first step, which then waits too.
+            clock = clock.max(board.output_clock(now));
+        }
         self.switched[motor] = clock;
         Self::switch_driver(motor, true, clock, board);
     }
@@ -150,33 +186,85 @@ impl MotionStream {
     }
 
     /// A motor's next step command, of the run that is being made.
-    pub(super) fn push(&mut self, command: &StepCommand, board: &mut Board) {
-        let Some(run) = self.run else { return };
+    pub(super) fn push(&mut self, command: &StepCommand, board: &mut Board, now: Seconds) {
         let motor = command.motor;
-        let Some(oids) = board.layout.steppers[motor] else { return };
-        let oid = oids.stepper.0;
-        let (interval, count, add) = match command.kind {
-            StepCommandKind::SetDir { forward } => {
-                // It travels with the steps that it is for.
-                self.pending[motor].forward = Some(forward);
-                return;
+        match command.kind {
+            StepCommandKind::SetDir { forward } => self.turn(motor, forward, board),
+            StepCommandKind::QueueStep { interval, count, add } => {
+                let forward = self.planned_forward[motor];
+                let row = Row { interval, count, add, forward, start: command.start, end: command.end };
+                self.send(motor, &row, board, now);
             }
-            StepCommandKind::QueueStep { interval, count, add } => (interval, count, add),
-        };
-        // A single step after a long rest has an interval modulo 2³²: its own clock is what counts.
-        let first = if count == 1 { command.end } else { command.start + Ticks(u64::from(interval)) };
-        let due = run.start + first;
-        self.enable(motor, due, board);
+        }
+    }
+
+    /// The direction of a motor's steps from here on. The order travels with the steps that it is for.
+    fn turn(&mut self, motor: usize, forward: bool, board: &Board) {
+        let Some(oids) = board.layout.steppers[motor] else { return };
+        self.planned_forward[motor] = forward;
+        self.forward[motor] = forward != oids.invert_dir;
+        self.pending[motor].forward = Some(forward);
+    }
+
+    fn send(&mut self, motor: usize, row: &Row, board: &mut Board, now: Seconds) {
+        let (Some(run), Some(oids)) = (self.run, board.layout.steppers[motor]) else { return };
+        let oid = oids.stepper.0;
+        let due = run.start + row.first();
+        self.enable(motor, due, board, now);
         let Pending { reset, forward } = core::mem::take(&mut self.pending[motor]);
         if reset {
-            board.motion(motor, &Command::ResetStepClock { oid, clock: run.start.low().0 }, due, None);
+            let clock = run.start + row.start;
+            board.motion(motor, &Command::ResetStepClock { oid, clock: clock.low().0 }, due, None);
         }
         if let Some(forward) = forward {
             let dir = u8::from(forward != oids.invert_dir);
             board.motion(motor, &Command::SetNextStepDir { oid, dir }, due, None);
         }
-        let end = run.start + command.end;
+        let Row { interval, count, add, .. } = *row;
+        let made = i32::from(count);
+        self.counts[motor] = self.counts[motor].wrapping_add(if self.forward[motor] { made } else { -made });
+        let end = run.start + row.end;
         board.motion(motor, &Command::QueueStep { oid, interval, count, add }, due, Some(end));
+    }
+
+    /// Takes up a run that the board holds.
+    pub(super) fn take_up(&mut self, taken: &TakenUp) -> Run {
+        let run = Run { start: taken.start, end: taken.end, homing: false };
+        self.run = Some(run);
+        self.counts = taken.counts;
+        self.counts_at_start = taken.counts_at_start;
+        self.position_at_start = taken.position_at_start;
+        self.elapsed = taken.elapsed;
+        self.enabled = [true; MOTORS];
+        run
+    }
+
+    /// Gives a board that has dropped its queue the steps again that it had not made, before those that are pushed next.
+    /// `forward` is the direction that holds after them.
+    pub(super) fn give_again(
+        &mut self,
+        backlog: &[VecDeque<Row>; MOTORS],
+        forward: [bool; MOTORS],
+        board: &mut Board,
+        now: Seconds,
+    ) {
+        let clock = board.output_clock(now);
+        for (motor, rows) in backlog.iter().enumerate() {
+            // They are on already, as far as anybody knows.
+            self.switched[motor] = clock;
+            Self::switch_driver(motor, true, clock, board);
+            self.pending[motor].reset = true;
+            self.turn(motor, rows.front().map_or(forward[motor], |row| row.forward), board);
+            for row in rows {
+                if row.forward != self.planned_forward[motor] {
+                    self.turn(motor, row.forward, board);
+                }
+                self.send(motor, row, board, now);
+            }
+            if forward[motor] != self.planned_forward[motor] {
+                self.turn(motor, forward[motor], board);
+            }
+        }
     }
 
     /// Something happens when the board's clock gets to `at`. In the order of the clocks.
@@ -219,17 +307,31 @@ impl MotionStream {
         self.run.take().is_some()
     }
 
-    /// How much motion the board has, in seconds from its clock: up to the first step that it has not acknowledged,
-    /// or to the end of what has been generated. `None` where no run is being made.
-    pub(super) fn queued_on_board(
+    /// The board says where it counts a motor to be, at rest.
+    pub(super) const fn set_count(&mut self, motor: usize, count: i32) {
+        self.counts[motor] = count;
+    }
+
+    /// Where the machine stands, in mm, from where the board counts its motors to be: the present run was broken off.
+    pub(super) fn position_of(
         &self,
-        generated_until: Option<Ticks>,
-        clock_now: Ticks,
+        counts: [i32; MOTORS],
+        steps_mm: [f64; MOTORS],
         board: &Board,
-    ) -> Option<Seconds> {
+    ) -> Position {
+        core::array::from_fn(|motor| {
+            let made = f64::from(counts[motor].wrapping_sub(self.counts_at_start[motor]));
+            let is_inverted = board.layout.steppers[motor].is_some_and(|oids| oids.invert_dir);
+            let made = if is_inverted { -made } else { made };
+            self.position_at_start[motor] + made * steps_mm[motor]
+        })
+    }
+
+    /// The clock up to which the board has all steps of the run: that of the first which it has not acknowledged, or
+    /// the end of what has been generated. `None` where no run is being made.
+    pub(super) fn covered(&self, generated_until: Option<Ticks>, board: &Board) -> Option<Ticks> {
         let run = self.run?;
         let generated = run.end.or(generated_until.map(|until| run.start + until))?;
-        let until = board.link.motion_covered().map_or(generated, |covered| covered.min(generated));
-        Some(board.clock.duration_of(until.saturating_sub(clock_now)))
+        Some(board.link.motion_covered().map_or(generated, |covered| covered.min(generated)))
     }
 }

@@ -26,13 +26,17 @@ const LOG_MAX: usize = 100_000;
 /// One pulse: when, which motor, which way.
 pub(crate) type Pulse = (u64, usize, bool);
 
-/// Every pulse of every motor.
+/// Every pulse of every motor, on the motion clock; that is the board's as long as nothing is held.
 #[derive(Debug, Default)]
-pub(crate) struct Pulses(pub(crate) Vec<Pulse>);
+pub(crate) struct Pulses(pub(crate) Vec<Pulse>, Ticks);
 
 impl Recorder for Pulses {
     fn step(&mut self, motor: usize, at: Ticks, forward: bool, _count: i64) {
-        self.0.push((at.0, motor, forward));
+        self.0.push(((at - self.1).0, motor, forward));
+    }
+
+    fn motion_behind(&mut self, behind: Ticks) {
+        self.1 = behind;
     }
 }
 
@@ -96,6 +100,8 @@ pub(crate) struct Bench {
     /// The session is not called.
     pub(crate) stalled: bool,
     to_host: Vec<u8>,
+    /// The job's journal, as it is kept.
+    pub(crate) journal: String,
 }
 
 impl Bench {
@@ -121,6 +127,7 @@ impl Bench {
             fed: 0,
             stalled: false,
             to_host: Vec::new(),
+            journal: String::new(),
         }
     }
 
@@ -189,6 +196,7 @@ impl Bench {
         let mut bytes = Vec::new();
         loop {
             let wake = self.session.poll(self.now(), &mut bytes);
+            self.journal += &self.session.take_journal();
             self.printer.write(&bytes);
             bytes.clear();
             self.take_events();
@@ -206,7 +214,7 @@ impl Bench {
     fn feed(&mut self) -> bool {
         let wants = self.session.job_wants();
         let wants = wants.min(self.feed_max - self.fed);
-        if wants == 0 || self.session.job_status() == JobStatus::None {
+        if wants == 0 {
             return false;
         }
         if self.file.is_empty() {
@@ -267,10 +275,15 @@ impl Bench {
         assert!(position.is_some_and(|(_, homed)| homed == [true; 3]), "{:?}", self.remarkable());
     }
 
-    pub(crate) fn start_with(&mut self, file: &str, options: JobOptions) -> Result<(), PrinterError> {
+    /// The file that is fed to the job, from its beginning.
+    pub(crate) fn load(&mut self, file: &str) {
         self.file = file.bytes().collect();
         self.file_ended = false;
         self.fed = 0;
+    }
+
+    pub(crate) fn start_with(&mut self, file: &str, options: JobOptions) -> Result<(), PrinterError> {
+        self.load(file);
         let now = self.now();
         self.session.start_job(options, now)
     }
@@ -346,11 +359,14 @@ impl Bench {
         &self.printer.recorder().0
     }
 
-    /// Pulses from the first one, with times from there.
+    /// Pulses from the first one, with times from there. Those of one tick, of different motors, have no order.
     pub(crate) fn relative_pulses(&self, from: usize) -> Vec<Pulse> {
         let pulses = &self.pulses()[from..];
         let first = pulses.first().map_or(0, |pulse| pulse.0);
-        pulses.iter().map(|&(at, motor, forward)| (at - first, motor, forward)).collect()
+        let mut pulses: Vec<Pulse> =
+            pulses.iter().map(|&(at, motor, forward)| (at - first, motor, forward)).collect();
+        pulses.sort_unstable();
+        pulses
     }
 
     /// Forward less backward pulses of each motor.

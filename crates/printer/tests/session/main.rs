@@ -1,10 +1,14 @@
 //! Whole sessions against the virtual printer: what is asked for happens, and whatever goes wrong ends with its own
 //! error and a machine that is safe.
 
+mod attach;
 mod bench;
 mod console;
 mod faults;
+mod heaters;
+mod hold;
 mod link;
 mod machine;
 mod print;
+mod start;
 mod stopping;

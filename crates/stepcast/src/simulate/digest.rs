@@ -1,6 +1,7 @@
 //! A fingerprint of every edge on the motors' pins.
 //!
-//! An edge counts with its motor, its kind and its distance in ticks from the first step of its run of motion. Two
+//! An edge counts with its motor, its kind and its distance in ticks of the motion clock from the first step of its run
+//! of motion; the end of a pulse, which waits for nothing, with the pulse's length. Two
 //! prints with the same fingerprint made the same pulses, however late the board got its orders and wherever on its clock
 //! the runs began. Homing is left out: there a switch decides when a run ends.
 //!
@@ -76,13 +77,11 @@ impl Digest {
         state.add(if forward { Kind::StepForward } else { Kind::StepBackward }, at.0.wrapping_sub(base));
     }
 
-    /// A pulse ended.
+    /// A pulse ended, so long after it began.
     #[inline]
-    pub(crate) fn step_end(&mut self, motor: usize, at: Ticks) {
-        if let (Some(state), Some(base)) = (self.motors.get_mut(motor), self.base)
-            && state.in_run
-        {
-            state.add(Kind::StepEnd, at.0.wrapping_sub(base));
+    pub(crate) fn step_end(&mut self, motor: usize, lasted: Ticks) {
+        if let Some(state) = self.motors.get_mut(motor).filter(|state| state.in_run) {
+            state.add(Kind::StepEnd, lasted.0);
         }
     }
 
@@ -152,7 +151,7 @@ mod tests {
         for start in starts {
             let base = start + first_step;
             digest.step(0, Ticks(base), true);
-            digest.step_end(0, Ticks(base + 5));
+            digest.step_end(0, Ticks(5));
             digest.step(1, Ticks(base + 3), true);
             digest.direction(0, Ticks(base + 50), false);
             digest.step(0, Ticks(base + 100 + nudge), false);
@@ -174,7 +173,7 @@ mod tests {
         let empty = digest.text();
         digest.expect_run(Ticks(10), true);
         digest.step(0, Ticks(20), true);
-        digest.step_end(0, Ticks(25));
+        digest.step_end(0, Ticks(5));
         assert_eq!(digest.text(), empty);
     }
 

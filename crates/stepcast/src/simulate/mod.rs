@@ -5,6 +5,7 @@
 
 mod digest;
 mod gcode_path;
+mod lease_tap;
 mod observer;
 mod path_check;
 mod report;
@@ -20,16 +21,18 @@ use printer::{
     error::{ErrorCode, PrinterError},
     session::JobOptions,
 };
+use units::Seconds;
 
-use self::{
+pub(crate) use self::{
     report::{Outcome, Report},
-    run::Simulation,
+    run::{Aftermath, PATH_ERROR_MAX_MM, Setup, Simulation, Successor},
 };
 use crate::{
     check,
-    cli::SimulateArgs,
+    cli::{Board, SimulateArgs},
     config_file,
     console::{self, ErrorReport},
+    input::Input,
 };
 
 /// The most findings of the check that are shown one by one.
@@ -42,8 +45,22 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
     let options = JobOptions {
         confirmed_lines: args.confirm_lines.iter().copied().collect::<BTreeSet<u32>>(),
         confirm_all: args.confirm_all,
+        journal: None,
+        start_line: None,
     };
-    let mut simulation = Simulation::new(args, config, options.clone())?;
+    let setup = Setup {
+        config,
+        board: args.machine.board.map(Board::profile),
+        faults: args.machine.faults(),
+        seed: args.machine.seed,
+        options: options.clone(),
+        consent_after: args.confirm_holds.then_some(Seconds::ZERO),
+        host_dies: None,
+        successor: None,
+        watched: run::AFTER,
+        quiet: false,
+    };
+    let mut simulation = Simulation::new(setup, Input::open(&args.file)?, Input::open(&args.file)?)?;
     if let Some(refusal) = Refusal::of(&found, &options) {
         refusal.show();
         let mut report = simulation.into_report();
@@ -143,7 +160,12 @@ mod tests {
         let refusal = Refusal::of(&found, &JobOptions::default()).unwrap();
         assert_eq!(refusal.reason.line, Some(2));
         assert_eq!(refusal.blocking.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [2, 3]);
-        let one = JobOptions { confirmed_lines: BTreeSet::from([2]), confirm_all: false };
+        let one = JobOptions {
+            confirmed_lines: BTreeSet::from([2]),
+            confirm_all: false,
+            journal: None,
+            start_line: None,
+        };
         assert_eq!(Refusal::of(&found, &one).unwrap().reason.line, Some(3));
         let all = JobOptions { confirm_all: true, ..JobOptions::default() };
         assert!(Refusal::of(&found, &all).is_none());

@@ -35,8 +35,12 @@ const MESSAGES_MAX: u32 = 100;
 pub(super) enum Wish {
     /// The printer is ready: start the job.
     Start,
+    /// The board holds a print whose host is gone.
+    TakeUp,
     /// The job is paused, and nobody is there: go on.
     Resume,
+    /// The board holds its motion, and nobody is there.
+    Held,
     /// It is over.
     End,
 }
@@ -51,6 +55,7 @@ pub(super) struct Observer {
     pub(super) moves: u64,
     pub(super) homing: Vec<Homing>,
     pub(super) pauses: u32,
+    pub(super) holds: u32,
     pub(super) nozzle: TemperatureWatch,
     pub(super) min_queued: Option<Seconds>,
     pub(super) print_time: Seconds,
@@ -59,20 +64,29 @@ pub(super) struct Observer {
     pub(super) error: Option<PrinterError>,
     /// Where the session's moves are not the file's.
     pub(super) mismatch: Option<String>,
+    /// Why the board last held its motion.
+    pub(super) held: Option<PrinterError>,
     /// The whole job was printed.
     pub(super) done: bool,
     /// A run that has begun and not yet had its first move.
     new_run: Option<Ticks>,
     /// Where the present run began, unless it homes.
     run_start: Option<Ticks>,
+    /// Where the first run began that does not home.
+    pub(super) began: Option<Ticks>,
+    /// Another host has taken the first one's place: it tells of moves again that were planned before.
+    pub(super) is_taken_up: bool,
+    /// The end of the last move that was told.
+    told_until: Ticks,
     /// When anything happened last.
     pub(super) last_change: Ticks,
     messages: u32,
+    quiet: bool,
 }
 
 impl Observer {
-    /// Nothing has happened yet. `reference` is the file, opened a second time.
-    pub(super) fn new(config: &PrinterConfig, reference: Input, start: Ticks) -> Self {
+    /// Nothing has happened yet. `reference` is the file, opened a second time; `quiet` shows none of its texts.
+    pub(super) fn new(config: &PrinterConfig, reference: Input, start: Ticks, quiet: bool) -> Self {
         Self {
             step_distance_mm: printer::machine::step_distances(config).map(|distance| distance.0),
             endstop_mm: config.steppers.each_ref().map(|axis| axis.position_endstop.0),
@@ -81,17 +95,23 @@ impl Observer {
             moves: 0,
             homing: Vec::new(),
             pauses: 0,
+            holds: 0,
             nozzle: TemperatureWatch::default(),
             min_queued: None,
             print_time: Seconds::ZERO,
             line: 0,
             error: None,
             mismatch: None,
+            held: None,
             done: false,
             new_run: None,
             run_start: None,
+            began: None,
+            is_taken_up: false,
+            told_until: Ticks(0),
             last_change: start,
             messages: 0,
+            quiet,
         }
     }
 
@@ -102,13 +122,15 @@ impl Observer {
         }
         match event {
             Event::Phase(PhaseName::Ready) => return Some(Wish::Start),
+            Event::Phase(PhaseName::Holding) => return Some(Wish::TakeUp),
             Event::Phase(PhaseName::Failed | PhaseName::Shutdown) | Event::JobCancelled => {
                 return Some(Wish::End);
             }
-            Event::RunStarted { at, .. } => self.new_run = Some(at),
+            Event::RunStarted { at, .. } => self.new_run = Some(self.clock_of(at, printer)),
             Event::Move(scheduled) => self.take_move(&scheduled, printer),
             Event::RunEnded { at } => {
                 if let Some(start) = self.run_start.take() {
+                    let at = self.clock_of(at, printer);
                     self.print_time += printer.profile().clock.duration_of(at.saturating_sub(start));
                 }
             }
@@ -123,13 +145,18 @@ impl Observer {
             Event::Progress { line, .. } => self.line = line,
             Event::Message(text) => {
                 self.messages += 1;
-                if self.messages <= MESSAGES_MAX {
+                if self.messages <= MESSAGES_MAX && !self.quiet {
                     console::note(&format!("printer: {text}"));
                 }
             }
             Event::Paused => {
                 self.pauses += 1;
                 return Some(Wish::Resume);
+            }
+            Event::Held(error) => {
+                self.holds += 1;
+                self.held = Some(error);
+                return Some(Wish::Held);
             }
             Event::JobDone => {
                 self.done = true;
@@ -155,11 +182,17 @@ impl Observer {
     }
 
     fn take_move(&mut self, scheduled: &ScheduledMove, printer: &mut VirtualPrinter<Tally>) {
-        let &ScheduledMove { line, start, end, from, to, homing, .. } = scheduled;
+        let &ScheduledMove { line, from, to, homing, .. } = scheduled;
+        let [start, end] = [scheduled.start, scheduled.end].map(|at| self.clock_of(at, printer));
+        if self.is_taken_up && end <= self.told_until {
+            return;
+        }
+        self.told_until = end;
         let tally = printer.recorder_mut();
         if let Some(at) = self.new_run.take() {
             tally.digest.expect_run(at, homing);
             self.run_start = (!homing).then_some(at);
+            self.began = self.began.or(self.run_start);
         }
         self.plan_steps(scheduled);
         let mut piece = Piece { line, from, to, bulge_mm: 0.0 };
@@ -182,6 +215,11 @@ impl Observer {
             self.mismatch
                 .get_or_insert_with(|| format!("line {line} was planned too far ahead to be followed"));
         }
+    }
+
+    /// A motion clock of the session's in 64 bits as the machine has them: a host that came later knows only 32.
+    fn clock_of(&self, at: Ticks, printer: &VirtualPrinter<Tally>) -> Ticks {
+        if self.is_taken_up { printer.motion_now().nearest(at.low()) } else { at }
     }
 
     /// Counts the steps of a move: those where it crosses half-way between two positions of a motor. An approach to an

@@ -179,8 +179,12 @@ impl PathCheck {
         if self.segments.len() >= LINES_AHEAD_MAX {
             return Err(TooFarAhead);
         }
+        // An approach to an endstop ends where its trigger says, mostly long before its planned end.
+        if let Some(last) = self.segments.back_mut().filter(|last| !last.measured) {
+            last.end = last.end.min(span.start.0);
+        }
         self.segments.push_back(Segment::new(span));
-        if self.segments.len() == 1 {
+        if self.segments.len() <= 2 {
             self.look_at_first();
         }
         Ok(())

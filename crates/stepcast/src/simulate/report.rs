@@ -53,12 +53,14 @@ pub(crate) struct Report {
     pub(crate) damaged_bytes: [u64; 2],
     /// `null` where the motion was too short to be queued ahead of itself.
     pub(crate) min_queued_s: Option<f64>,
-    /// A fingerprint of every edge on the motors' pins but homing's.
+    /// A fingerprint of every edge on the motors' pins but homing's, on the motion clock.
     pub(crate) pulse_digest: String,
     /// The same of the pulses with their directions, whenever the direction pins changed before them.
     pub(crate) step_digest: String,
     pub(crate) homing: Vec<Homing>,
     pub(crate) pauses: u32,
+    /// How often the board brought its motion to rest because its host was held up.
+    pub(crate) holds: u32,
     pub(crate) after: After,
 }
 
@@ -168,6 +170,7 @@ mod tests {
             step_digest: "fedcba9876543210".to_owned(),
             homing: Vec::new(),
             pauses: 0,
+            holds: 0,
             after: After::default(),
         }
     }

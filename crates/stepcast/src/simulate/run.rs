@@ -7,21 +7,22 @@ use std::{collections::BTreeMap, time::Instant};
 
 use printer::{
     config::PrinterConfig,
-    error::PrinterError,
+    error::{ErrorCode, PrinterError},
+    journal::{Journal, JournalError},
     machine::{EXTRUDER, MOTOR_NAMES},
     session::{JobOptions, JobStatus, Request, Session},
 };
-use units::{Hertz, Seconds, Ticks};
-use virtual_printer::{State, VirtualPrinter};
+use units::{Celsius, Hertz, Seconds, Ticks};
+use virtual_printer::{BoardProfile, Faults, HeaterView, HostStall, State, VirtualPrinter};
 
 use super::{
+    lease_tap::LeaseTap,
     observer::{Observer, Wish},
     own_error,
     report::{After, Motor, Outcome, Report},
     tally::Tally,
 };
 use crate::{
-    cli::{Board, SimulateArgs},
     console::{ErrorReport, Progress},
     input::Input,
 };
@@ -33,7 +34,7 @@ const CRYSTAL_ERROR: f64 = 30e-6;
 /// The session is called again after this time at the earliest, whatever it asks for.
 const WAKE_MIN: Seconds = Seconds(50e-6);
 /// After the end the machine is watched for so long: long enough for the board's own watch over its heaters.
-const AFTER: Seconds = Seconds(6.0);
+pub(super) const AFTER: Seconds = Seconds(6.0);
 /// A print in which nothing happens for so long is given up.
 const STALL_MAX: Seconds = Seconds(6.0 * 3600.0);
 /// How often the nozzle's temperature is looked at.
@@ -41,7 +42,9 @@ const SAMPLE_INTERVAL: Seconds = Seconds(0.1);
 /// The nozzle counts as extruding for so long after a step of the extruder's.
 const EXTRUDING: Seconds = Seconds(0.25);
 /// The path may be this far off, or by a step of each axis where that is more.
-const PATH_ERROR_MAX_MM: f64 = 0.02;
+pub(crate) const PATH_ERROR_MAX_MM: f64 = 0.02;
+/// A heater that is held at its stand-by is this much above it at times.
+const STANDBY_BAND_C: f64 = 5.0;
 /// The progress bar is drawn this often, in rounds of the loop.
 const ROUNDS_PER_DRAW: u32 = 256;
 
@@ -76,8 +79,67 @@ enum Stage {
     Watching(Ticks),
 }
 
+/// What is simulated.
+pub(crate) struct Setup {
+    /// The machine.
+    pub(crate) config: PrinterConfig,
+    /// The board; without one, that whose pins the machine file names.
+    pub(crate) board: Option<BoardProfile>,
+    /// What goes wrong.
+    pub(crate) faults: Faults,
+    /// What all chance follows from.
+    pub(crate) seed: u64,
+    /// The user's confirmations before the print.
+    pub(crate) options: JobOptions,
+    /// The user confirms that a held print goes on, so long after it was shown as such; never without.
+    pub(crate) consent_after: Option<Seconds>,
+    /// The host is gone for good from this time of the board's on.
+    pub(crate) host_dies: Option<Seconds>,
+    /// Another host takes its place then.
+    pub(crate) successor: Option<Successor>,
+    /// The machine is watched for so long after the end.
+    pub(crate) watched: Seconds,
+    /// Nothing is shown on the terminal.
+    pub(crate) quiet: bool,
+}
+
+/// A host that takes the place of one that is gone.
+pub(crate) struct Successor {
+    /// So long after that.
+    pub(crate) after: Seconds,
+    /// The file, from its beginning.
+    pub(crate) job: Input,
+    /// Of the journal there is only this share; all of it is 1.
+    pub(crate) journal_part: f64,
+}
+
+/// What came of a print whose host is gone, or was held up.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Aftermath {
+    /// The first run of motion began then; `None` without any.
+    pub(crate) began: Option<Ticks>,
+    /// The host was gone.
+    pub(crate) host_died: Option<Ticks>,
+    /// The lease that the board was told last brings motion to rest by then.
+    pub(crate) lease_rest: Option<Ticks>,
+    /// The last step of any motor.
+    pub(crate) last_step: Option<Ticks>,
+    /// When a heater was on last.
+    pub(crate) heated: Ticks,
+    /// When one was on last that was warmer than its stand-by.
+    pub(crate) overheated: Ticks,
+    /// Motion that began again without the user's word after a hold was shown.
+    pub(crate) restarts: u32,
+    /// The end of the job, before the machine was watched.
+    pub(crate) ended: Ticks,
+    /// The pulses that came while no line was being executed.
+    pub(crate) strays: u64,
+    /// The board's clock at power-up.
+    pub(crate) start: Ticks,
+}
+
 /// A print on the virtual printer.
-pub(super) struct Simulation {
+pub(crate) struct Simulation {
     printer: VirtualPrinter<Tally>,
     session: Session,
     clock: HostClock,
@@ -85,7 +147,24 @@ pub(super) struct Simulation {
     job: Input,
     job_fed: bool,
     options: JobOptions,
+    consent_after: Option<Seconds>,
+    /// The user will say yes then to what was held …
+    consent_at: Option<Ticks>,
+    /// … and until then nothing moves: the last step when the hold was shown.
+    held_at: Option<Ticks>,
+    host_dies: Option<Ticks>,
+    successor: Option<Successor>,
+    config: PrinterConfig,
+    journal: String,
+    /// When the host does nothing: from and until when; soonest last.
+    stalls: Vec<(Ticks, Ticks)>,
     stage: Stage,
+    watched: Seconds,
+    quiet: bool,
+    /// The temperatures at which heaters are safe without a host.
+    standby: [(&'static str, Celsius); 2],
+    lease: LeaseTap,
+    aftermath: Aftermath,
     next_sample: Ticks,
     seed: u64,
     path_error_max_mm: f64,
@@ -94,30 +173,57 @@ pub(super) struct Simulation {
 }
 
 impl Simulation {
-    /// Powers the machine up and opens the file.
-    pub(super) fn new(
-        args: &SimulateArgs,
-        mut config: PrinterConfig,
-        options: JobOptions,
-    ) -> anyhow::Result<Self> {
-        let board = demo_machine::fit(&mut config, args.machine.board.map(Board::profile).as_ref())?;
+    /// Powers the machine up. `job` is what the host is fed, `reference` the same, for the path that it should draw.
+    pub(crate) fn new(setup: Setup, job: Input, reference: Input) -> anyhow::Result<Self> {
+        let Setup {
+            mut config,
+            board,
+            faults,
+            seed,
+            options,
+            consent_after,
+            host_dies,
+            successor,
+            watched,
+            quiet,
+        } = setup;
+        let board = demo_machine::fit(&mut config, board.as_ref())?;
         let machine = demo_machine::machine(&config)?;
         let step_distances = printer::machine::step_distances(&config).map(|distance| distance.0);
         let tally = Tally::new(step_distances, board.clock);
         let host_hz = board.clock;
-        let printer = VirtualPrinter::new(board, &machine, &args.machine.faults(), args.machine.seed, tally)?;
-        let clock = HostClock::new(printer.start(), host_hz);
+        let printer = VirtualPrinter::new(board, &machine, &faults, seed, tally)?;
+        let start = printer.start();
+        let clock = HostClock::new(start, host_hz);
         let [x, y, z, _] = step_distances;
+        let standby = [
+            ("extruder", config.extruder.as_ref().map(|extruder| extruder.heater.standby_temp)),
+            ("heater_bed", config.heater_bed.as_ref().map(|bed| bed.standby_temp)),
+        ]
+        .map(|(name, standby)| (name, standby.unwrap_or(Celsius(0.0))));
         Ok(Self {
-            observer: Observer::new(&config, Input::open(&args.file)?, printer.start()),
-            session: Session::new(config, clock.at(printer.now())),
+            observer: Observer::new(&config, reference, start, quiet),
+            session: Session::new(config.clone(), clock.at(printer.now())),
             clock,
-            job: Input::open(&args.file)?,
+            job,
             job_fed: false,
             options,
+            consent_after,
+            consent_at: None,
+            held_at: None,
+            host_dies: host_dies.map(|at| start + host_hz.ticks_in(at)),
+            successor,
+            config,
+            journal: String::new(),
+            stalls: stalls(&faults.host_stalls, start, host_hz),
             stage: Stage::Connecting,
-            next_sample: printer.start(),
-            seed: args.machine.seed,
+            watched,
+            quiet,
+            standby,
+            lease: LeaseTap::default(),
+            aftermath: Aftermath { start, ..Aftermath::default() },
+            next_sample: start,
+            seed,
             path_error_max_mm: PATH_ERROR_MAX_MM.max((x * x + y * y + z * z).sqrt()),
             wall_s: 0.0,
             after: After::default(),
@@ -126,14 +232,17 @@ impl Simulation {
     }
 
     /// Prints the file to its end, or until something fails.
-    pub(super) fn run(&mut self) -> anyhow::Result<()> {
+    pub(crate) fn run(&mut self) -> anyhow::Result<()> {
         let began = Instant::now();
-        let progress = Progress::new("simulating", self.job.size());
+        let progress = (!self.quiet).then(|| Progress::new("simulating", self.job.size()));
         let mut to_host = Vec::new();
         let mut to_board = Vec::new();
         let mut rounds = 0u32;
         loop {
-            let wake = self.attend(&mut to_board)?;
+            let wake = match self.away_until() {
+                Some(until) => self.clock.at(until),
+                None => self.attend(&mut to_board)?,
+            };
             if let Stage::Watching(until) = self.stage
                 && self.printer.now() >= until
             {
@@ -145,7 +254,7 @@ impl Simulation {
             let until = self.clock.ticks_at(wake).max(earliest).min(self.next_sample.max(earliest));
             self.printer.run_until(until, &mut to_host);
             let now = self.printer.now();
-            if !to_host.is_empty() {
+            if !to_host.is_empty() && self.away_until().is_none() {
                 self.session.receive(&to_host, self.clock.at(now));
                 to_host.clear();
             }
@@ -153,8 +262,8 @@ impl Simulation {
                 self.sample(now);
             }
             rounds = rounds.wrapping_add(1);
-            if rounds.is_multiple_of(ROUNDS_PER_DRAW) {
-                self.draw(&progress);
+            if let Some(progress) = progress.as_ref().filter(|_| rounds.is_multiple_of(ROUNDS_PER_DRAW)) {
+                self.draw(progress);
             }
         }
         self.wall_s = began.elapsed().as_secs_f64();
@@ -166,15 +275,18 @@ impl Simulation {
         loop {
             let now = self.clock.at(self.printer.now());
             let wake = self.session.poll(now, to_board);
+            self.journal += &self.session.take_journal();
             if !to_board.is_empty() {
+                self.lease.watch(to_board, self.printer.now());
                 self.printer.write(to_board);
                 to_board.clear();
             }
-            let acted = self.take_events(now);
+            let acted = self.take_events(now) | self.consent(now);
             let fed = self.feed()?;
             if !acted && !fed {
                 self.observer.queued(self.session.motion_queued(now));
-                return Ok(wake);
+                let consent = self.consent_at.map(|at| self.clock.at(at));
+                return Ok(consent.map_or(wake, |consent| wake.min(consent)));
             }
         }
     }
@@ -190,10 +302,22 @@ impl Simulation {
                     self.stage = Stage::Printing;
                     self.session.start_job(self.options.clone(), now)
                 }
+                Wish::Held => match self.consent_after {
+                    Some(after) => {
+                        self.consent_at = Some(self.printer.now() + self.ticks(after));
+                        self.held_at = self.printer.recorder().last_step;
+                        Ok(())
+                    }
+                    None => Err(self.observer.held.clone().unwrap_or(ErrorCode::HeldHostAway.into())),
+                },
                 Wish::Resume => self.session.request(Request::Resume, now),
                 Wish::End => {
                     self.end();
                     Ok(())
+                }
+                Wish::TakeUp => self.take_up(),
+                Wish::Start if self.observer.is_taken_up && self.session.job_status() == JobStatus::None => {
+                    Err(PrinterError::new(ErrorCode::ContinuationRefused, "the board held nothing"))
                 }
                 Wish::Start => Ok(()),
             };
@@ -205,15 +329,56 @@ impl Simulation {
         acted
     }
 
+    /// The board holds a print: the host that is there now has its journal.
+    fn take_up(&mut self) -> Result<(), PrinterError> {
+        let refused =
+            |error: JournalError| PrinterError::new(ErrorCode::ContinuationRefused, error.to_string());
+        let journal = Journal::read(self.journal.as_bytes()).map_err(refused)?;
+        self.session.take_up(&journal)
+    }
+
+    /// Another host takes the place of the one that is gone, if it is time for that.
+    fn succeed(&mut self, died: Ticks) -> Option<Ticks> {
+        let now = self.printer.now();
+        let at = died + self.ticks(self.successor.as_ref()?.after);
+        if at > now {
+            return Some(at);
+        }
+        let Successor { job, journal_part, .. } = self.successor.take()?;
+        self.host_dies = None;
+        self.job = job;
+        self.job_fed = false;
+        let kept = (self.journal.len() as f64 * journal_part) as usize;
+        // A journal is plain ASCII.
+        self.journal.truncate(kept);
+        self.session = Session::new(self.config.clone(), self.clock.at(now));
+        self.observer.is_taken_up = true;
+        None
+    }
+
+    /// The user says yes to what is held, once that is due.
+    fn consent(&mut self, now: Seconds) -> bool {
+        if self.consent_at.take_if(|at| *at <= self.printer.now()).is_none() {
+            return false;
+        }
+        self.aftermath.restarts += u32::from(self.printer.recorder().last_step != self.held_at);
+        if let Err(error) = self.session.request(Request::Resume, now) {
+            self.observer.error.get_or_insert(error);
+            self.end();
+        }
+        true
+    }
+
     fn end(&mut self) {
         if !matches!(self.stage, Stage::Watching(_)) {
-            self.stage = Stage::Watching(self.printer.now() + self.ticks(AFTER));
+            self.aftermath.ended = self.printer.now();
+            self.stage = Stage::Watching(self.printer.now() + self.ticks(self.watched));
         }
     }
 
     /// Feeds the session what it wants of the file.
     fn feed(&mut self) -> Result<bool, PrinterError> {
-        if self.job_fed || self.stage != Stage::Printing || self.session.job_status() == JobStatus::None {
+        if self.job_fed || self.stage != Stage::Printing {
             return Ok(false);
         }
         let wants = self.session.job_wants();
@@ -234,16 +399,46 @@ impl Simulation {
         self.next_sample = now + self.ticks(SAMPLE_INTERVAL);
         let extruding = self.ticks(EXTRUDING);
         let state = self.printer.state();
+        let motion_now = self.printer.motion_now();
         let tally = self.printer.recorder_mut();
-        // Up to now, no pulse is missing.
-        tally.path.settle(now);
+        // Up to now, no pulse is missing. A board that has stopped everything executes no line any more.
+        if state.shutdown.is_none() {
+            tally.path.settle(motion_now);
+        }
         let extruding = tally.extruded_at.is_some_and(|at| at + extruding >= now);
+        let is_hot = |heater: &&HeaterView| {
+            let standby = self.standby.iter().find(|(name, _)| *name == heater.name);
+            standby.is_none_or(|(_, standby)| heater.temperature.0 > standby.0 + STANDBY_BAND_C)
+        };
+        let mut heated = state.heaters.iter().filter(|heater| heater.duty > 0.0).peekable();
+        if heated.peek().is_some() {
+            self.aftermath.heated = now;
+        }
+        if heated.any(|heater| is_hot(&heater)) {
+            self.aftermath.overheated = now;
+        }
         let time = self.clock.at(now);
         if self.stage == Stage::Printing
             && let Some(nozzle) = state.heaters.iter().find(|heater| heater.name == MOTOR_NAMES[EXTRUDER])
         {
             self.observer.nozzle.sample(time, nozzle.temperature, extruding);
         }
+    }
+
+    /// Until when the host does nothing, if it is held up now or gone.
+    fn away_until(&mut self) -> Option<Ticks> {
+        let now = self.printer.now();
+        if self.host_dies.is_some_and(|at| at <= now) {
+            let died = *self.aftermath.host_died.get_or_insert(now);
+            if self.stage == Stage::Printing && self.successor.is_some() {
+                return self.succeed(died);
+            }
+            self.end();
+            let Stage::Watching(until) = self.stage else { return None };
+            return Some(until.max(now + self.ticks(SAMPLE_INTERVAL)));
+        }
+        while self.stalls.pop_if(|(_, until)| *until <= now).is_some() {}
+        self.stalls.last().filter(|(from, _)| *from <= now).map(|(_, until)| *until)
     }
 
     fn check_stall(&self) -> anyhow::Result<()> {
@@ -271,18 +466,31 @@ impl Simulation {
         progress.say(format!("line {}, {:.0} s", self.observer.line, self.virtual_time().0));
     }
 
+    /// How it ended, as the machine saw it.
+    pub(crate) fn aftermath(&self) -> Aftermath {
+        let tally = self.printer.recorder();
+        Aftermath {
+            began: self.observer.began,
+            lease_rest: self.lease.rest(),
+            last_step: tally.last_step,
+            strays: tally.path.strays().0,
+            ..self.aftermath
+        }
+    }
+
     /// What came of it.
-    pub(super) fn into_report(mut self) -> Report {
+    pub(crate) fn into_report(mut self) -> Report {
         let virtual_time = self.virtual_time();
         let now = self.printer.now();
         self.observer.finish();
         let state = self.printer.state();
         let profile_name = self.printer.profile().name;
+        let motion_now = self.printer.motion_now();
         let tally = self.printer.recorder_mut();
         if self.observer.done {
             tally.path.finish();
-        } else {
-            tally.path.settle(now);
+        } else if state.shutdown.is_none() {
+            tally.path.settle(motion_now);
         }
         let still = tally.last_step.is_none_or(|at| at + Ticks(1) < now);
         self.after = After {
@@ -321,10 +529,22 @@ impl Simulation {
             step_digest: tally.digest.step_text(),
             homing: std::mem::take(&mut self.observer.homing),
             pauses: self.observer.pauses,
+            holds: self.observer.holds,
             after: self.after,
             motors,
         }
     }
+}
+
+/// From and until when the host is held up; soonest last.
+fn stalls(stalls: &[HostStall], start: Ticks, clock: Hertz) -> Vec<(Ticks, Ticks)> {
+    let span = |stall: &HostStall| {
+        let from = start + clock.ticks_in(stall.at);
+        (from, from + clock.ticks_in(stall.lasts))
+    };
+    let mut spans: Vec<_> = stalls.iter().map(span).collect();
+    spans.sort_by_key(|&(from, _)| core::cmp::Reverse(from));
+    spans
 }
 
 fn motors(observer: &Observer, tally: &Tally, state: &State) -> BTreeMap<&'static str, Motor> {

@@ -1,4 +1,7 @@
 //! What watches the simulated motors' pins: counts, the path they draw, and their fingerprint.
+//!
+//! Path and fingerprint go by the motion clock, by which the print was planned: it is the board's clock, less the time
+//! that motion was held.
 
 use printer::machine::{EXTRUDER, MOTORS};
 use units::{Hertz, Ticks};
@@ -19,6 +22,10 @@ pub(crate) struct Tally {
     pub(crate) extruded_at: Option<Ticks>,
     /// The last step of any motor.
     pub(crate) last_step: Option<Ticks>,
+    /// How far the motion clock is behind the board's.
+    behind: Ticks,
+    /// The last edge that began a pulse of each motor.
+    pulse_at: [Ticks; MOTORS],
 }
 
 impl Tally {
@@ -30,6 +37,8 @@ impl Tally {
             digest: Digest::default(),
             extruded_at: None,
             last_step: None,
+            behind: Ticks(0),
+            pulse_at: [Ticks(0); MOTORS],
         }
     }
 }
@@ -43,17 +52,25 @@ impl Recorder for Tally {
         if motor == EXTRUDER && forward {
             self.extruded_at = Some(at);
         }
+        self.pulse_at[motor] = at;
+        let at = at - self.behind;
         self.digest.step(motor, at, forward);
         self.path.pulse(motor, at, count);
     }
 
     #[inline]
+    fn motion_behind(&mut self, behind: Ticks) {
+        self.behind = behind;
+    }
+
+    #[inline]
     fn step_end(&mut self, motor: usize, at: Ticks) {
-        self.digest.step_end(motor, at);
+        let Some(&began) = self.pulse_at.get(motor) else { return };
+        self.digest.step_end(motor, at - began);
     }
 
     #[inline]
     fn direction(&mut self, motor: usize, at: Ticks, forward: bool) {
-        self.digest.direction(motor, at, forward);
+        self.digest.direction(motor, at - self.behind, forward);
     }
 }

@@ -118,6 +118,13 @@ impl Bench {
         Self { firmware: Box::new(Firmware::new(CLOCK)), board, sequence: 0 }
     }
 
+    /// The same with plain Klipper firmware.
+    pub(crate) fn plain(now: u64) -> Self {
+        let mut bench = Self::at(now);
+        *bench.firmware = Firmware::new(CLOCK).plain();
+        bench
+    }
+
     /// A board whose host has configured `commands`.
     pub(crate) fn configured(now: u64, commands: &[Command<'_>]) -> Self {
         let mut bench = Self::at(now);
@@ -128,11 +135,22 @@ impl Bench {
         bench
     }
 
-    /// Sends a block with the next number and returns whether it was acknowledged.
-    pub(crate) fn send_payload(&mut self, payload: &[u8]) {
-        self.firmware.receive(&mut self.board, Block::new(self.sequence, payload).as_bytes());
-        self.sequence = self.sequence.wrapping_add(1);
+    /// Hands the board bytes as they are.
+    pub(crate) fn receive(&mut self, bytes: &[u8]) {
+        self.firmware.receive(&mut self.board, bytes);
         self.firmware.run_timers(&mut self.board);
+    }
+
+    /// Sends a block with the next number.
+    pub(crate) fn send_payload(&mut self, payload: &[u8]) {
+        self.receive(Block::new(self.sequence, payload).as_bytes());
+        self.sequence = self.sequence.wrapping_add(1);
+    }
+
+    /// Sends commands, a block each, from this number on.
+    pub(crate) fn send_from(&mut self, sequence: u8, commands: &[Command<'_>]) {
+        self.sequence = sequence;
+        self.send_all(commands);
     }
 
     pub(crate) fn send(&mut self, command: &Command<'_>) {
@@ -165,9 +183,10 @@ impl Bench {
     /// Lets time pass, as a timer interrupt would see it.
     pub(crate) fn run_until(&mut self, until: u64) {
         loop {
-            let next = self.firmware.run_timers(&mut self.board);
+            let mut next = self.firmware.run_timers(&mut self.board);
             if self.firmware.has_tasks() {
                 self.firmware.run_tasks(&mut self.board);
+                next = self.firmware.run_timers(&mut self.board);
             }
             let next = Ticks(self.board.now).nearest(next).0;
             assert!(next > self.board.now, "a timer that was due did not run");

@@ -117,6 +117,10 @@ fn cases() -> Vec<(ShutdownReason, Vec<Command<'static>>)> {
         (R::InvalidPwm, vec![Command::SetDigitalOutPwmCycle { oid: HEATER, cycle_ticks: 1 << 31 }]),
         (R::InvalidAdcTiming, vec![sample(soon, 100, 7000)]),
         (R::InvalidEndstop, vec![home(soon, 0, TRSYNC)]),
+        (R::InvalidMotion, vec![Command::MotionHold { ramp: (1 << 30) + 1 }]),
+        (R::InvalidMotion, vec![Command::MotionRate { rate: 0, ramp: 0 }]),
+        (R::InvalidMotion, vec![Command::MotionRate { rate: 4097, ramp: 0 }]),
+        (R::MotionNotHeld, vec![Command::MotionDrop {}]),
     ]
 }
 
@@ -167,7 +171,7 @@ fn every_fault_stops_the_board() {
 
 #[test]
 fn the_cases_cover_every_reason_but_those_tested_on_their_own() {
-    // Configuration and parser faults, a late timer; and trsync parameters, none of which are invalid.
+    // Configuration and parser faults, a late timer, heaters; and trsync parameters, none of which are invalid.
     let elsewhere = [
         ShutdownReason::TimerInPast,
         ShutdownReason::CommandParser,
@@ -177,6 +181,10 @@ fn the_cases_cover_every_reason_but_those_tested_on_their_own() {
         ShutdownReason::InvalidPin,
         ShutdownReason::InvalidAdcPin,
         ShutdownReason::InvalidTrsync,
+        ShutdownReason::InvalidHeater,
+        ShutdownReason::HeaterSensor,
+        ShutdownReason::HeaterNotHeating,
+        ShutdownReason::HeaterDrifted,
     ];
     for reason in ShutdownReason::ALL {
         let is_case = cases().iter().any(|case| case.0 == *reason);

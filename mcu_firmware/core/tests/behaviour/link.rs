@@ -96,7 +96,7 @@ fn the_dictionary_arrives_in_pieces() {
         Response::IdentifyResponse { data, .. } => Some(data.len()),
         _ => None,
     });
-    assert_eq!(lengths, [0, 10, 50]);
+    assert_eq!(lengths, [0, 10, 46]);
 }
 
 fn config(bench: &mut Bench) -> (u8, u32, u8, u16) {

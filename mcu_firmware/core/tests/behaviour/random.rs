@@ -11,13 +11,19 @@ use wire::{
 use crate::bench::{Bench, CLOCK, SECOND, output, stepper};
 
 /// Objects of every kind, so that random oids hit some.
-const CONFIG: [Command<'static>; 6] = [
+const CONFIG: [Command<'static>; 12] = [
     stepper(0),
     output(1, 36_000_000),
     Command::ConfigTrsync { oid: 2 },
     Command::ConfigEndstop { oid: 3, pin: 5, pull_up: 0 },
     Command::ConfigAnalogIn { oid: 4, pin: 26 },
     output(5, 0),
+    Command::SetDigitalOutPwmCycle { oid: 1, cycle_ticks: 1000 },
+    Command::ConfigHeater { oid: 6, adc_oid: 4, out_oid: 1, sample_count: 2, max_power: 4096, smooth: 1000 },
+    Command::HeaterPoint { oid: 6, sum: 100, temperature: 300 },
+    Command::HeaterPoint { oid: 6, sum: 60_000, temperature: 0 },
+    Command::HeaterPid { oid: 6, kp: 1 << 24, ki: 1 << 20, kd: 0 },
+    Command::HeaterCheck { oid: 6, max_error: 1, gain_time: 1000, hysteresis: 1, gain: 1 },
 ];
 
 /// A number near the limits of what the protocol can say, small, or near the present clock.
@@ -39,7 +45,7 @@ fn command() -> impl Strategy<Value = Vec<u8>> {
                 _ => value,
             };
             // Oids of objects that exist are what leads furthest.
-            let value = if field.name.ends_with("oid") { value % 6 } else { value };
+            let value = if field.name.ends_with("oid") { value % 7 } else { value };
             vlq::encode(value as i32, &mut bytes);
         }
         bytes
@@ -51,8 +57,9 @@ fn run_for(bench: &mut Bench, ticks: u64) {
     const ROUNDS_MAX: u32 = 200;
     let until = bench.board.now + ticks;
     for _ in 0..ROUNDS_MAX {
-        let next = bench.firmware.run_timers(&mut bench.board);
+        bench.firmware.run_timers(&mut bench.board);
         bench.firmware.run_tasks(&mut bench.board);
+        let next = bench.firmware.run_timers(&mut bench.board);
         let next = units::Ticks(bench.board.now).nearest(next).0;
         assert!(next > bench.board.now, "a timer that was due did not run");
         bench.board.now = next.min(until);
@@ -86,7 +93,7 @@ proptest! {
             bench.send_payload(&payload);
             if clear && bench.shutdown().is_some() {
                 bench.send(&Command::ClearShutdown {});
-                bench.send(&Command::AllocateOids { count: 6 });
+                bench.send(&Command::AllocateOids { count: 7 });
                 bench.send_all(&CONFIG);
                 bench.send(&Command::FinalizeConfig { crc: 0 });
             }

@@ -175,6 +175,9 @@ fn check_both_ways(text: &str, homings: usize) {
 
     let mut bench = Bench::at(0);
     let fired = recording.play(&mut bench, true);
+    let mut plain = Bench::plain(0);
+    assert_eq!(recording.play(&mut plain, true), fired);
+    assert!(plain.board.edges == bench.board.edges, "a board without the motion clock makes other edges");
     assert_eq!(fired, [], "kept alive, no trigger fires");
     for (&oid, steps) in &recording.steps {
         assert_eq!(

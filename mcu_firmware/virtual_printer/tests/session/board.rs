@@ -1,6 +1,6 @@
 //! The board as a host meets it: dictionary, clock, sensors, heaters, the link and its faults.
 
-use crate::host::{Host, machine};
+use crate::host::{Answer, Host, machine};
 use proptest::prelude::*;
 use units::{Celsius, Seconds};
 use virtual_printer::{BoardProfile, Faults, Machine, Recorder, Sensor, VirtualPrinter, WiringError};
@@ -295,4 +295,19 @@ proptest! {
         prop_assert!(state.motors.iter().all(|motor| motor.position.0.is_finite()));
         prop_assert!(state.heaters.iter().all(|heater| (0.0..800.0).contains(&heater.temperature.0)));
     }
+}
+
+#[test]
+fn a_board_that_starts_anew_lets_its_pins_go_and_says_so() {
+    let mut host = Host::usual("board-reset@6", ());
+    configure(&mut host);
+    heat(&mut host, 1.0, 5);
+    assert!(host.state().heaters[0].duty > 0.0);
+    host.answers.clear();
+    host.run(2.0);
+    let state = host.state();
+    assert_eq!((state.shutdown, state.heaters[0].duty), (None, 0.0));
+    let is_starting =
+        |answer: &Answer| matches!(Response::decode(&mut &answer.payload[..]), Ok(Response::Starting {}));
+    assert!(host.answers.iter().any(is_starting));
 }

@@ -8,7 +8,7 @@ use wire::{Command, Response};
 const PULSE: u32 = 24;
 
 /// Object 0 is X, 1 its enable pin, 2 its trigger, 3 its endstop; 4 is E, 5 its enable pin.
-fn configure<R: Recorder>(host: &mut Host<R>) {
+pub(crate) fn configure<R: Recorder>(host: &mut Host<R>) {
     let stepper = |oid, step_pin, dir_pin| Command::ConfigStepper {
         oid,
         step_pin,
@@ -34,9 +34,8 @@ fn configure<R: Recorder>(host: &mut Host<R>) {
     assert_eq!(host.state().shutdown, None);
 }
 
-/// Queues a run of X from rest: up to `speed` steps/s and down again.
-fn queue_ramp<R: Recorder>(host: &mut Host<R>, start: Ticks, forward: bool, speed: f64, cruise: u16) {
-    let clock = f64::from(host.printer.profile().clock.0);
+/// Intervals and counts from rest up to `speed` steps/s.
+fn ramp_rows(clock: f64, speed: f64) -> Vec<(u32, u16)> {
     let accel = 160_000.0;
     let ramp = (speed * speed / (2.0 * accel)) as u16;
     // Rows of ten steps with intervals that follow the square root, the way any planner's do.
@@ -50,16 +49,45 @@ fn queue_ramp<R: Recorder>(host: &mut Host<R>, start: Ticks, forward: bool, spee
         last = until;
         done += count;
     }
-    let down: Vec<_> = rows.iter().rev().copied().collect();
-    rows.push(((clock / speed) as u32, cruise));
-    rows.extend(down);
+    rows
+}
+
+/// Queues a run of X from rest: up to `speed` steps/s and down again.
+pub(crate) fn queue_ramp<R: Recorder>(
+    host: &mut Host<R>,
+    start: Ticks,
+    forward: bool,
+    speed: f64,
+    cruise: u16,
+) {
+    queue_start(host, start, forward, speed, cruise);
+    let clock = f64::from(host.printer.profile().clock.0);
+    for (interval, count) in ramp_rows(clock, speed).into_iter().rev() {
+        host.send(&[Command::QueueStep { oid: 0, interval, count, add: 0 }]);
+    }
+}
+
+/// The same without the end; gives the clock of its last step.
+pub(crate) fn queue_start<R: Recorder>(
+    host: &mut Host<R>,
+    start: Ticks,
+    forward: bool,
+    speed: f64,
+    cruise: u16,
+) -> Ticks {
+    let clock = f64::from(host.printer.profile().clock.0);
     host.send(&[
         Command::ResetStepClock { oid: 0, clock: start.low().0 },
         Command::SetNextStepDir { oid: 0, dir: u8::from(forward) },
     ]);
+    let mut rows = ramp_rows(clock, speed);
+    rows.push(((clock / speed) as u32, cruise));
+    let mut end = start;
     for (interval, count) in rows {
         host.send(&[Command::QueueStep { oid: 0, interval, count, add: 0 }]);
+        end += Ticks(u64::from(interval) * u64::from(count));
     }
+    end
 }
 
 #[test]
@@ -167,7 +195,7 @@ fn without_current_the_carriage_stays() {
 }
 
 /// Moves X towards its endstop with the board watching it; gives what the trigger reported: reason and steps.
-fn home<R: Recorder>(host: &mut Host<R>) -> (u8, i32) {
+pub(crate) fn home<R: Recorder>(host: &mut Host<R>) -> (u8, i32) {
     let start = host.after(0.2);
     host.send(&[
         Command::TrsyncStart {

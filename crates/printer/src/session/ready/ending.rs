@@ -5,10 +5,10 @@ use units::Seconds;
 use super::{Held, Ready, Wait};
 use crate::{
     error::{Ended, ErrorCode, PrinterError},
-    planner::ExtrusionPermit,
+    planner::{ExtrusionPermit, Planner},
     session::{
         event::Event,
-        job::{Job, JobState, Paused, RETURN_FEED},
+        job::{Job, JobState, JobStatus, Paused, RETURN_FEED},
     },
 };
 
@@ -43,6 +43,15 @@ impl Ready {
         self.thermal.set_fan(0.0, None, &mut self.board, now);
     }
 
+    /// What was typed and not yet done is not done, and waits no longer.
+    pub(super) fn stop_typed(&mut self) {
+        if self.is_console_busy() {
+            self.planner.drop_barrier();
+            self.forget_console();
+            self.stop_waiting();
+        }
+    }
+
     /// Nothing is waited for any more; an axis that is being homed stops.
     fn stop_waiting(&mut self) {
         self.held = Held::default();
@@ -65,6 +74,9 @@ impl Ready {
     }
 
     pub(in crate::session) fn cancel(&mut self, now: Seconds) -> Result<(), PrinterError> {
+        if self.cancel_held(now) {
+            return Ok(());
+        }
         let is_console_busy = self.is_console_busy();
         match &mut self.job {
             Some(job) if matches!(job.state, JobState::Failing(_)) => return Ok(()),
@@ -78,46 +90,51 @@ impl Ready {
         Ok(())
     }
 
-    /// Goes back to where the job was paused, and on.
+    /// Goes on with what is held; else goes back to where the job was paused, and on.
     pub(in crate::session) fn resume(&mut self, now: Seconds) -> Result<(), PrinterError> {
-        let Some(paused) = self.job.as_ref().and_then(|job| job.paused) else {
+        if self.resume_held(now)? {
+            return Ok(());
+        }
+        let paused = self.job.as_ref().filter(|job| job.state == JobState::Paused);
+        let Some(paused) = paused.and_then(|job| job.paused.as_ref()) else {
             return Err(PrinterError::new(ErrorCode::NoJob, "no job is paused"));
         };
+        let Paused { homed: was_homed, could_extrude, start, .. } = *paused;
         if self.is_console_busy() {
             return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
         }
         let homed = self.planner.guard.homed();
-        if (0..3).any(|axis| paused.homed[axis] && !homed[axis]) {
-            return Err(PrinterError::new(
-                ErrorCode::NotHomed,
-                "the position was lost while the job was paused",
-            ));
+        if (0..3).any(|axis| was_homed[axis] && !homed[axis]) {
+            let detail = match start {
+                Some(_) => "the way to the first line leads from a known place only",
+                None => "the position was lost while the job was paused",
+            };
+            return Err(PrinterError::new(ErrorCode::NotHomed, detail));
         }
-        if let (true, ExtrusionPermit::TooCold { celsius }) = (paused.could_extrude, self.extrusion_permit())
-        {
-            let detail = format!("the nozzle has cooled to {celsius:.0} °C while the job was paused");
-            return Err(PrinterError::new(ErrorCode::ColdExtrusion, detail));
+        let targets = paused.targets.clone();
+        let heats = self.heat_again(&targets, could_extrude, false, now)?;
+        if heats {
+            self.wait = Wait::Heat;
+        } else {
+            self.go_back()?;
         }
-        self.go_back(&paused)?;
-        let Some(job) = &mut self.job else { return Err(ErrorCode::NoJob.into()) };
-        let filament_mm = self.planner.position()[3] - paused.position[3];
-        self.planner.rejoin(&mut job.source, filament_mm);
-        job.state = JobState::Printing;
-        job.paused = None;
-        let Held { wait, barrier } = core::mem::take(&mut self.held);
-        self.wait = wait.go_on(now);
-        self.planner.put_barrier(barrier);
+        if let Some(job) = &mut self.job {
+            job.state = JobState::Returning;
+        }
         self.events.push(Event::Resumed);
         Ok(())
     }
 
     /// Across first, at the greater height, then down: nothing is hit on the way. The filament stays as it is, and so
     /// does an axis whose position was not known then.
-    fn go_back(&mut self, paused: &Paused) -> Result<(), PrinterError> {
+    pub(super) fn go_back(&mut self) -> Result<(), PrinterError> {
+        let Some(paused) = self.job.as_ref().and_then(|job| job.paused.as_ref()) else { return Ok(()) };
+        let Paused { position, homed: was_homed, start, .. } = *paused;
         let here = self.planner.position();
         let [x, y, z] =
-            core::array::from_fn(|axis| if paused.homed[axis] { paused.position[axis] } else { here[axis] });
-        let (up, e) = (here[2].max(z), here[3]);
+            core::array::from_fn(|axis| if was_homed[axis] { position[axis] } else { here[axis] });
+        let clear_z = start.map_or(z, |start| start.clear_z);
+        let (up, e) = (here[2].max(z).max(clear_z), here[3]);
         for to in [[here[0], here[1], up, e], [x, y, up, e], [x, y, z, e]] {
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
         }
@@ -128,33 +145,58 @@ impl Ready {
     /// uses is switched off.
     pub(super) fn rest(&mut self, now: Seconds) {
         if !self.is_at_rest() || !matches!(self.wait, Wait::Nothing) {
-            self.last_active = now;
+            // Motion that is held waits for the user, as a pause does.
+            if self.hold_status() != Some(JobStatus::Held) {
+                self.last_active = now;
+            }
             return;
         }
         let state = self.job.as_ref().map(|job| job.state.clone());
         match state {
             Some(JobState::Pausing) => self.is_paused(now),
+            Some(JobState::Returning) => self.has_returned(now),
             Some(JobState::Cancelling) => self.end_job(Event::JobCancelled, now),
             Some(JobState::Failing(error)) => self.end_job(Event::Error(error), now),
-            Some(JobState::Printing) => {}
+            Some(JobState::Printing | JobState::Skipping) => {}
             Some(JobState::Paused) | None => self.idle(now),
         }
     }
 
+    /// The job's planner is put aside, and another one moves the machine until it is back.
     fn is_paused(&mut self, now: Seconds) {
-        let paused = Paused {
-            position: self.planner.position(),
-            homed: self.planner.guard.homed(),
-            could_extrude: self.extrusion_permit() == ExtrusionPermit::Allowed,
+        let (position, homed) = (self.planner.position(), self.planner.guard.homed());
+        let mut aside = match Planner::new(&self.config, self.board.clock) {
+            Ok(aside) => aside,
+            Err(error) => return self.source_failed(error, now),
         };
+        aside.stand_at(position);
+        (0..3).for_each(|axis| aside.guard.set_homed(axis, homed[axis]));
+        let could_extrude = self.extrusion_permit() == ExtrusionPermit::Allowed;
+        let targets = self.thermal.wanted();
+        let planner = Box::new(core::mem::replace(&mut self.planner, aside));
         if let Some(job) = &mut self.job {
             job.state = JobState::Paused;
-            job.paused = Some(paused);
+            job.paused = Some(Paused { planner, position, homed, could_extrude, targets, start: None });
         }
         self.last_active = now;
         self.console.clear();
         self.planner.adopt(&mut self.console.source);
         self.events.push(Event::Paused);
+    }
+
+    /// The machine is where the job was paused: its own planner goes on.
+    fn has_returned(&mut self, now: Seconds) {
+        let Some(job) = &mut self.job else { return };
+        job.state = JobState::Printing;
+        if let Some(paused) = job.paused.take() {
+            self.planner = *paused.planner;
+            if let Some(start) = paused.start {
+                self.thermal.set_fan(start.fan, None, &mut self.board, now);
+            }
+        }
+        let Held { wait, barrier } = core::mem::take(&mut self.held);
+        self.wait = wait.go_on(now);
+        self.planner.put_barrier(barrier);
     }
 
     /// A job that ends early leaves everything off.
@@ -165,6 +207,7 @@ impl Ready {
 
     fn forget_job(&mut self, event: Event) {
         self.job = None;
+        self.diary.end(&mut self.board);
         self.held = Held::default();
         self.planner.drop_barrier();
         self.console.clear();

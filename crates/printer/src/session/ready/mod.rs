@@ -4,20 +4,29 @@
 //! with before anything that follows.
 
 mod ending;
+mod hold;
 mod plan;
+mod start;
+mod take_up;
 mod waiting;
 
 use gcode::LineNumber;
-use units::{Seconds, Ticks};
+use units::Seconds;
 
-use self::waiting::{Held, Wait};
+use self::{
+    hold::{Calls, Hold},
+    waiting::{Held, Wait},
+};
 use super::{
     board::Board,
     connect,
     console::Console,
+    diary::Diary,
     event::{Event, Events},
     inbox::{self, Message},
     job::{Job, JobStatus, PROGRESS_INTERVAL},
+    layout::StepperOids,
+    lease::Lease,
     stream::{Due, MotionStream},
     thermal::Thermal,
 };
@@ -30,8 +39,12 @@ use crate::{
 
 /// While motion is being made, the planner is asked for more at least this often.
 const PUMP_INTERVAL: Seconds = Seconds(0.05);
+/// While lines are passed over, the owner is asked for more of the file this often.
+const SKIP_INTERVAL: Seconds = Seconds(0.002);
 /// How often a machine at rest looks after itself.
 const IDLE_INTERVAL: Seconds = Seconds(0.25);
+/// Motion that is due this long ago and has not been sent is none that the board could make.
+const LATE_MAX: Seconds = Seconds(1.0);
 
 /// What a failure leads to.
 #[derive(Debug)]
@@ -60,16 +73,29 @@ pub(super) struct Ready {
     /// What a paused job was waiting for.
     held: Held,
     pub(super) events: Events,
+    pub(super) diary: Diary,
     pub(super) last_active: Seconds,
+    lease: Lease,
+    /// Motion is held.
+    hold: Option<Hold>,
+    /// The board has lowered its heaters, which has not been dealt with.
+    have_heaters_fallen: bool,
+    calls: Calls,
 }
 
 impl Ready {
-    pub(super) fn new(config: PrinterConfig, mut board: Board, now: Seconds) -> Result<Self, PrinterError> {
-        let mut planner = Planner::new(&config, board.clock)?;
+    pub(super) fn new(config: PrinterConfig, board: Board, now: Seconds) -> Result<Self, PrinterError> {
+        let planner = Planner::new(&config, board.clock)?;
+        let mut ready = Self::with_planner(config, board, planner, now);
+        ready.planner.adopt(&mut ready.console.source);
+        Ok(ready)
+    }
+
+    fn with_planner(config: PrinterConfig, mut board: Board, planner: Planner, now: Seconds) -> Self {
         let thermal = Thermal::start(&config, &mut board, now);
-        let mut console = Console::new(Source::new(machine::gcode_settings(&config)));
-        planner.adopt(&mut console.source);
-        Ok(Self {
+        let console = Console::new(Source::new(machine::gcode_settings(&config)));
+        let lease = Lease::new(&config);
+        Self {
             config,
             board,
             planner,
@@ -81,23 +107,30 @@ impl Ready {
             wait: Wait::Nothing,
             held: Held::default(),
             events: Events::default(),
+            diary: Diary::default(),
             last_active: now,
-        })
+            lease,
+            hold: None,
+            have_heaters_fallen: false,
+            calls: Calls::default(),
+        }
     }
 
     /// What the job is doing.
     pub(super) fn job_status(&self) -> JobStatus {
-        self.job.as_ref().map_or(JobStatus::None, Job::status)
+        let of_job = || self.job.as_ref().map_or(JobStatus::None, Job::status);
+        self.hold_status().unwrap_or_else(of_job)
     }
 
     /// Motion that the board has, in seconds, while a run is being made and more of it is to come.
     pub(super) fn motion_queued(&self, now: Seconds) -> Option<Seconds> {
-        let clock_now = self.board.clock_at(now);
+        let motion_now = self.board.motion_at(now);
         let run = self.stream.run()?;
-        if run.homing || run.end.is_some() || clock_now < run.start {
+        if run.homing || run.end.is_some() || motion_now < run.start || !self.board.motion.is_steady() {
             return None;
         }
-        self.stream.queued_on_board(self.planner.generated_until(), clock_now, &self.board)
+        let covered = self.stream.covered(self.planner.generated_until(), &self.board)?;
+        Some(self.board.clock.duration_of(covered.saturating_sub(motion_now)))
     }
 
     /// Whether what was typed is still being carried out.
@@ -115,7 +148,17 @@ impl Ready {
         self.planner.is_at_rest() && self.stream.run().is_none()
     }
 
+    /// What came during a long pause has waited: it tells nothing of now.
+    fn note_call(&mut self, now: Seconds) {
+        if self.calls.note(now) {
+            self.thermal.listens_again(now);
+        }
+    }
+
     pub(super) fn receive(&mut self, bytes: &[u8], now: Seconds) -> Result<(), Failure> {
+        self.note_call(now);
+        // After a long pause nothing may be claimed of the motion clock, whose 32 bits say little then.
+        self.lease.is_in_doubt(&mut self.board, now);
         for (message, sent) in inbox::receive(&mut self.board.link, &self.board.dictionary, bytes, now) {
             self.on_message(message, sent, now)?;
         }
@@ -137,6 +180,11 @@ impl Ready {
             Message::Shutdown { reason } => return Err(Failure::Shutdown(self.shutdown_error(reason))),
             Message::Starting => return Err(Failure::Lost(ErrorCode::BoardRestarted.into())),
             Message::Config { .. } => {}
+            Message::Heater(report) => {
+                self.have_heaters_fallen |= self.thermal.on_board_heater(report, now);
+            }
+            Message::Motion(report) => self.on_motion(&report, now),
+            Message::Queue { oid, queue, .. } => self.on_queue(oid, &queue),
             Message::Position { .. } | Message::Endstop { .. } | Message::Trigger { .. } => {
                 self.on_homing_message(message, now);
             }
@@ -155,6 +203,13 @@ impl Ready {
     }
 
     fn on_homing_message(&mut self, message: Message, now: Seconds) {
+        if let Message::Position { oid, position } = message {
+            let is_it = |oids: &Option<StepperOids>| oids.is_some_and(|oids| oids.stepper.0 == oid);
+            let motor = self.board.layout.steppers.iter().position(is_it);
+            if let Some(motor) = motor {
+                self.stream.set_count(motor, position);
+            }
+        }
         let Wait::Homing { axis, .. } = &mut self.wait else { return };
         let result = match message {
             Message::Position { oid, position } => axis.on_position(oid, position),
@@ -175,30 +230,68 @@ impl Ready {
         if self.board.sync.is_silent(now) {
             return Err(Failure::Lost(ErrorCode::LinkLost.into()));
         }
+        self.note_call(now);
         self.thermal.check_silence(now).map_err(Failure::Stop)?;
         connect::ask_clock(&mut self.board, now);
         self.board.note_losses(now);
-        let clock_now = self.board.clock_at(now);
-        while let Some(due) = self.stream.pop_due(clock_now) {
-            self.on_due(due, now);
-        }
         self.thermal.poll(&mut self.board, now);
-        self.stream.take_finished(clock_now, &self.board);
-        self.advance_wait(now);
-        self.pump(now)?;
-        self.rest(now);
-        let clock_now = self.board.clock_at(now);
-        let link_wake = self.board.link.poll(now, clock_now, out);
+        if !self.lease.is_in_doubt(&mut self.board, now) {
+            self.go_on(now)?;
+        }
+        self.check_late(now)?;
+        let link_wake = self.board.link.poll(now, self.board.clocks(now), out);
         let busy = self.stream.run().is_some() || !matches!(self.wait, Wait::Nothing);
-        let own_wake = now + if busy { PUMP_INTERVAL } else { IDLE_INTERVAL };
+        let own_wake = now
+            + match busy {
+                _ if self.skips() => SKIP_INTERVAL,
+                true => PUMP_INTERVAL,
+                false => IDLE_INTERVAL,
+            };
         let wake = own_wake.min(self.board.sync.next_wake());
         Ok(link_wake.map_or(wake, |link| link.min(wake)))
+    }
+
+    /// Steps that were due long ago must not be sent: beyond half of its clock's range a board takes what is past for what
+    /// is to come.
+    fn check_late(&self, now: Seconds) -> Result<(), Failure> {
+        let due = self.board.link.motion_waiting();
+        let late = due.is_some_and(|due| due + self.board.ticks(LATE_MAX) < self.board.motion_at(now));
+        if late { Err(Failure::Stop(ErrorCode::OrdersTooLate.into())) } else { Ok(()) }
+    }
+
+    /// Does what is due by the motion clock, and what follows from it.
+    fn go_on(&mut self, now: Seconds) -> Result<(), Failure> {
+        if self.waits_to_rejoin() {
+            if core::mem::take(&mut self.have_heaters_fallen) {
+                self.heaters_fell(now);
+            }
+            return self.advance_hold(now);
+        }
+        let motion_now = self.board.motion_at(now);
+        while let Some(due) = self.stream.pop_due(motion_now) {
+            self.on_due(due, now);
+        }
+        if let Some(run) = self.stream.take_finished(motion_now, &self.board) {
+            self.lease.end(run, &mut self.board);
+        }
+        if core::mem::take(&mut self.have_heaters_fallen) {
+            self.heaters_fell(now);
+        }
+        self.advance_wait(now);
+        self.advance_hold(now)?;
+        self.pump(now)?;
+        self.renew_lease(now);
+        self.rest(now);
+        Ok(())
     }
 
     fn on_due(&mut self, due: Due, now: Seconds) {
         match due {
             Due::MoveEnd(made) => {
                 let elapsed = self.stream.elapsed(made.end, &self.board);
+                if made.line > 0 && self.plans_job() {
+                    self.diary.progress(made.line, elapsed, now);
+                }
                 if let Some(job) =
                     self.job.as_mut().filter(|job| made.line > 0 && now - job.told >= PROGRESS_INTERVAL)
                 {
@@ -222,6 +315,9 @@ impl Ready {
         }
         match action {
             TimedAction::SetTemperature { heater, target } => {
+                if !self.plans_job() {
+                    self.diary.target(heater, target.0);
+                }
                 if let Err(error) = self.thermal.set_target(heater, target, &mut self.board, now) {
                     self.source_failed(error.at_line(line.0), now);
                 }
@@ -245,10 +341,5 @@ impl Ready {
             Some(job) if job.is_active() => &mut job.source,
             _ => &mut self.console.source,
         }
-    }
-
-    /// The clock of the end of everything that has been planned.
-    pub(super) fn clock_at(&self, now: Seconds) -> Ticks {
-        self.board.clock_at(now)
     }
 }

@@ -1,16 +1,18 @@
 //! From the planner to the board: items of the plan, one after the other, as far ahead as the stream wants them.
 
 use gcode::{Heater as HeaterName, LineNumber, Severity};
+use motion::PlannedMove;
 use units::{Celsius, Seconds};
 
 use super::{Failure, Ready, Wait};
 use crate::{
     error::{ErrorCode, PrinterError},
+    journal::Input,
     planner::{Barrier, ExtrusionPermit, Planned, TimedAction},
     session::{
         event::{Event, ScheduledMove, SpeedProfile},
         job::{Job, JobState},
-        stream::Due,
+        stream::{Due, Run},
     },
 };
 
@@ -20,31 +22,48 @@ const PLAN_ITEMS_MAX: usize = 4096;
 impl Ready {
     /// Takes from the planner what is to be sent.
     pub(super) fn pump(&mut self, now: Seconds) -> Result<(), Failure> {
+        if self.skips() {
+            self.skip(now);
+            return Ok(());
+        }
         self.planner.guard.extrusion = self.extrusion_permit();
         for _ in 0..PLAN_ITEMS_MAX {
-            let clock_now = self.board.clock_at(now);
+            let clock_now = self.board.motion_at(now);
             if !self.stream.wants_more(self.planner.generated_until(), clock_now, &self.board) {
                 return Ok(());
             }
             // A run that has been planned is first made to its end.
             let run_planned = self.planner.is_at_rest() && self.stream.run().is_some();
             let homing = matches!(self.wait, Wait::Homing { .. });
-            if run_planned || !(homing || matches!(self.wait, Wait::Nothing)) {
+            // Nor is there a place on the clock for a new one while motion is held.
+            let may_start = self.stream.run().is_some() || self.board.motion.is_steady();
+            if !may_start || run_planned || !(homing || matches!(self.wait, Wait::Nothing)) {
                 return Ok(());
             }
             let stopping = self.job.as_ref().is_some_and(|job| {
-                matches!(job.state, JobState::Pausing | JobState::Cancelling | JobState::Failing(_))
+                matches!(
+                    job.state,
+                    JobState::Pausing | JobState::Returning | JobState::Cancelling | JobState::Failing(_)
+                )
             });
-            if stopping {
-                self.planner.finish_run();
+            if stopping && !homing {
+                self.finish_run();
             }
+            let is_jobs = !homing && self.plans_job();
+            let fed = self.job.as_ref().map_or(0, |job| job.source.fed());
             let source = match &mut self.job {
                 _ if homing || stopping => &mut self.silence,
                 Some(job) if job.is_active() => &mut job.source,
                 _ => &mut self.console.source,
             };
             let planned = match self.planner.next(source) {
-                Ok(planned) => planned,
+                Ok(planned) => {
+                    // What comes to rest reads nothing.
+                    if is_jobs && !(stopping && planned == Planned::NeedsInput) {
+                        self.diary.planned(&planned, fed);
+                    }
+                    planned
+                }
                 Err(error) if self.planner.is_broken() => return Err(Failure::Stop(error)),
                 Err(error) => {
                     self.source_failed(error, now);
@@ -76,35 +95,31 @@ impl Ready {
         match planned {
             Planned::RunStarted(position) => {
                 let homing = matches!(self.wait, Wait::Homing { .. });
-                let run = self.stream.start_run(&self.board, now, homing);
+                let run = self.stream.start_run(position, &self.board, now, homing);
+                self.lease.forget();
+                if !homing && self.plans_job() {
+                    self.diary.run(run.start, &mut self.board);
+                } else {
+                    self.diary.other_run(&mut self.board);
+                }
                 if let Wait::Homing { axis, .. } = &mut self.wait {
-                    axis.run_started(run.start, &mut self.board, now);
+                    let start = self.board.hardware_of(run.start, now);
+                    axis.run_started(start, &mut self.board, now);
                 }
                 self.events.push(Event::RunStarted { at: run.start, position });
             }
             Planned::Move(planned) => {
                 let Some(run) = self.stream.run() else { return Ok(true) };
-                let at = |time: f64| run.start + self.board.ticks(Seconds(time));
-                let scheduled = ScheduledMove {
-                    line: planned.tag,
-                    start: at(planned.start_time),
-                    end: at(planned.end_time()),
-                    from: planned.from,
-                    to: planned.to,
-                    speed: SpeedProfile::new(&planned, at),
-                    homing: run.homing,
-                };
-                self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
-                self.events.push(Event::Move(scheduled));
+                self.schedule_move(&planned, run);
             }
-            Planned::Steps(command) => self.stream.push(&command, &mut self.board),
+            Planned::Steps(command) => self.stream.push(&command, &mut self.board, now),
             Planned::Timed { at, line, action } => self.on_timed(at, line, action, now),
             Planned::RunEnded(at) => {
                 if let Some(run) = self.stream.run() {
                     let end = run.start + self.board.ticks(at);
                     self.stream.end_run(end);
                     if let Wait::Homing { axis, .. } = &mut self.wait {
-                        axis.run_planned(end);
+                        axis.run_planned(self.board.hardware_of(end, now));
                     }
                     self.events.push(Event::RunEnded { at: end });
                 }
@@ -115,6 +130,22 @@ impl Ready {
             Planned::EndOfSource => self.finish_job(now),
         }
         Ok(true)
+    }
+
+    /// A move has its place on the motion clock.
+    pub(super) fn schedule_move(&mut self, planned: &PlannedMove, run: Run) {
+        let at = |time: f64| run.start + self.board.ticks(Seconds(time));
+        let scheduled = ScheduledMove {
+            line: planned.tag,
+            start: at(planned.start_time),
+            end: at(planned.end_time()),
+            from: planned.from,
+            to: planned.to,
+            speed: SpeedProfile::new(planned, at),
+            homing: run.homing,
+        };
+        self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
+        self.events.push(Event::Move(scheduled));
     }
 
     /// Notes what a job leaves behind.
@@ -169,7 +200,7 @@ impl Ready {
 
     /// The source has nothing more at hand; `true` when the planner should be asked again all the same.
     pub(super) fn on_drained(&mut self, now: Seconds) -> bool {
-        let clock_now = self.board.clock_at(now);
+        let clock_now = self.board.motion_at(now);
         let printing = self.job.as_ref().is_some_and(|job| job.state == JobState::Printing);
         let homing = matches!(self.wait, Wait::Homing { .. });
         let is_typed = !homing && !self.job.as_ref().is_some_and(Job::is_active);
@@ -182,7 +213,20 @@ impl Ready {
         {
             return false;
         }
-        self.planner.finish_run();
+        self.finish_run();
         true
+    }
+
+    /// Whether the planner plans the job, and nothing that is done meanwhile.
+    pub(super) fn plans_job(&self) -> bool {
+        self.job.as_ref().is_some_and(|job| job.paused.is_none())
+    }
+
+    /// Has the machine come to rest after what has been read.
+    fn finish_run(&mut self) {
+        let homing = matches!(self.wait, Wait::Homing { .. });
+        if self.planner.finish_run() && !homing && self.plans_job() {
+            self.diary.input(Input::FinishRun);
+        }
     }
 }

@@ -20,9 +20,21 @@ use crate::{
 #[derive(Debug)]
 pub(super) enum Wait {
     Nothing,
-    Heater { heater: HeaterName, until: HeaterGoal },
-    Dwell { until: Seconds },
-    Homing { axis: Box<AxisHoming>, remaining: VecDeque<usize>, axes: [bool; 3], line: LineNumber },
+    /// For all heaters, before a paused job goes back to where it was.
+    Heat,
+    Heater {
+        heater: HeaterName,
+        until: HeaterGoal,
+    },
+    Dwell {
+        until: Seconds,
+    },
+    Homing {
+        axis: Box<AxisHoming>,
+        remaining: VecDeque<usize>,
+        axes: [bool; 3],
+        line: LineNumber,
+    },
 }
 
 /// What a job was waiting for, or was about to, when it was paused.
@@ -52,7 +64,7 @@ impl Wait {
         let held = match *self {
             Self::Heater { heater, until } => HeldWait::Heater { heater, until },
             Self::Dwell { until } => HeldWait::Dwell { rest: until - now },
-            Self::Nothing | Self::Homing { .. } => return HeldWait::Nothing,
+            Self::Nothing | Self::Heat | Self::Homing { .. } => return HeldWait::Nothing,
         };
         *self = Self::Nothing;
         held
@@ -83,6 +95,14 @@ impl Ready {
     pub(super) fn advance_wait(&mut self, now: Seconds) {
         match &mut self.wait {
             Wait::Nothing => {}
+            Wait::Heat => {
+                if self.thermal.is_heated() {
+                    self.wait = Wait::Nothing;
+                    if let Err(error) = self.go_back() {
+                        self.source_failed(error, now);
+                    }
+                }
+            }
             Wait::Dwell { until } => {
                 if now >= *until {
                     self.wait = Wait::Nothing;
@@ -150,7 +170,7 @@ impl Ready {
     fn break_run(&mut self, now: Seconds) {
         self.planner.abandon_run();
         if self.stream.abandon(&mut self.board) {
-            self.events.push(Event::RunBroken { at: self.board.clock_at(now) });
+            self.events.push(Event::RunBroken { at: self.board.motion_at(now) });
         }
     }
 
@@ -219,6 +239,10 @@ impl Ready {
             }
             Barrier::Dwell(pause) => self.wait = Wait::Dwell { until: now + pause },
             Barrier::MotorsOff(motors) => {
+                if !self.plans_job() {
+                    // Whatever is done by hand now, a job that is paused cannot be taken up.
+                    self.diary.other_run(&mut self.board);
+                }
                 self.stream.disable(motors, &mut self.board, now);
                 for axis in (0..3).filter(|&axis| motors[axis]) {
                     self.planner.guard.set_homed(axis, false);

@@ -178,3 +178,29 @@ fn lines_that_are_shorter_than_the_tolerance_are_no_trouble() {
     assert!(check.worst().distance_mm <= STEP_MM / 2.0 + 0.0026, "{:?}", check.worst());
     assert_eq!(check.strays().0, 0);
 }
+
+#[test]
+fn a_homing_move_that_its_trigger_cuts_short_hides_nothing_behind_it() {
+    let mut homing = span(1, 0, 1_000_000, [300.0, 0.0], [0.0, 0.0]);
+    homing.homing = true;
+    let line = span(2, 50_000, 60_000, [0.0, 0.0], [STEP_MM, 0.0]);
+    let next = span(3, 60_000, 90_000, [STEP_MM, 0.0], [0.0, 0.0]);
+    let announce = || {
+        let mut check = check();
+        for span in [homing, line, next] {
+            check.expect(&span).unwrap();
+        }
+        check
+    };
+    let mut good = announce();
+    good.pulse(0, Ticks(55_000), 1);
+    good.pulse(0, Ticks(75_000), 0);
+    good.finish();
+    assert!(good.worst().distance_mm < 1e-9, "{:?}", good.worst());
+    let mut bad = announce();
+    for count in 1..=8 {
+        bad.pulse(0, Ticks(51_000 + count as u64 * 1000), count);
+    }
+    assert_eq!(bad.worst().line, 2);
+    assert!(bad.worst().distance_mm > 6.0 * STEP_MM, "{:?}", bad.worst());
+}

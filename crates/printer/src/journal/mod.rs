@@ -1,0 +1,418 @@
+//! What a print's plan depends on besides its file and the machine file, written down before it takes effect.
+//!
+//! The plan is a function of file, machine and what is journaled here, so that a host that has lost everything else can
+//! make the same plan again ([`Replay`]) and go on where the board holds. A journal is text: a line is a record, the
+//! CRC-32 of its JSON before it. It is only ever added to, so one that was torn off is right up to where it was torn.
+//!
+//! Knows no board, no time and no storage: the owner keeps the bytes, and must have kept them before it sends what it got
+//! at the same time.
+
+mod replay;
+mod rows;
+
+use core::fmt::Write as _;
+use std::collections::BTreeSet;
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use serde::{Deserialize, Serialize};
+use units::{Hertz, Seconds};
+
+pub(crate) use self::{
+    replay::{Advance, Continuation, Replay, TimedDue},
+    rows::{BoardQueue, MotorQueue, Row},
+};
+
+use crate::{config::PrinterConfig, machine::MOTORS, planner::Position};
+
+/// The format that is written, and the only one that is read.
+pub const FORMAT: u32 = 1;
+/// The most bytes that wait for the owner. One that takes none keeps no journal.
+pub const PENDING_BYTES_MAX: usize = 1024 * 1024;
+/// The most bytes of a journal that are read: a print of weeks.
+pub const JOURNAL_BYTES_MAX: usize = 64 * 1024 * 1024;
+/// Progress is written no more often than this.
+pub const PROGRESS_INTERVAL: Seconds = Seconds(2.0);
+
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// A place in a job's plan, at which something changed it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Place {
+    /// Items of the plan before it.
+    pub items: u64,
+    /// Everything in this many bytes of the file had been read; where nothing is said, no more than the items took.
+    pub drained: Option<u64>,
+}
+
+/// What changed a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Input {
+    /// The run of motion was brought to its end.
+    FinishRun,
+    /// The speed factor, 1 is as written.
+    Speed(f64),
+    /// The extrusion factor.
+    Flow(f64),
+    /// The user set the fan, 0 ..= 1. Not part of the plan either.
+    Fan(f64),
+    /// The user set a heater, in °C. Not part of the plan, but of what it is carried out with.
+    Target(HeaterName, f64),
+}
+
+/// How far a motor has come in the rows of a run of motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RowPlace {
+    /// Rows that have been made.
+    pub done: u32,
+    /// Of the next, the steps that are left; 0 where none of them has been made.
+    pub left: u16,
+}
+
+/// A heater in a journal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HeaterName {
+    /// The nozzle.
+    Nozzle,
+    /// The bed.
+    Bed,
+}
+
+impl HeaterName {
+    /// As everywhere else.
+    pub(crate) const fn heater(self) -> gcode::Heater {
+        match self {
+            Self::Nozzle => gcode::Heater::Tool(0),
+            Self::Bed => gcode::Heater::Bed,
+        }
+    }
+}
+
+/// A line of a journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Record {
+    /// A print began.
+    Began {
+        /// [`FORMAT`].
+        format: u32,
+        /// The print's own number.
+        print: u32,
+        /// [`machine_check`] of its machine.
+        machine: u32,
+        /// The board's nominal clock in Hz.
+        clock: u32,
+        /// Where the machine stood, and which axes were homed.
+        position: Position,
+        /// See `position`.
+        homed: [bool; 3],
+        /// Blocking lines that were confirmed …
+        confirmed: BTreeSet<u32>,
+        /// … or all of them.
+        confirm_all: bool,
+        /// The line with which the print begins, where that is not the first.
+        start_line: Option<u32>,
+    },
+    /// Something changed the plan.
+    Input {
+        /// Where.
+        at: Place,
+        /// What.
+        input: Input,
+    },
+    /// The board counts the rows of a run of motion from here on, under this number.
+    Run {
+        /// The board's number.
+        id: u32,
+        /// The run's place among those of the print, from 1.
+        run: u32,
+        /// The low half of the motion clock of the run's begin.
+        start: u32,
+        /// Where each motor's count begins.
+        from: [RowPlace; MOTORS],
+    },
+    /// A host that began anew took up the plan: of the inputs so far only so many had come into force.
+    Continued {
+        /// See the record.
+        inputs: usize,
+    },
+    /// The print got so far.
+    Progress {
+        /// The line of the last move that has been made.
+        line: u32,
+        /// Print time in seconds.
+        elapsed: f64,
+    },
+    /// The print is over, one way or another.
+    Ended,
+}
+
+/// What distinguishes a machine from others, as far as a plan depends on it.
+pub fn machine_check(config: &PrinterConfig) -> u32 {
+    CRC.checksum(format!("{config:?}").as_bytes())
+}
+
+/// Writes records.
+#[derive(Clone, Debug, Default)]
+pub struct Writer {
+    pending: String,
+    /// More came than the owner took: what follows would make no sense.
+    is_broken: bool,
+}
+
+impl Writer {
+    /// Adds a record.
+    pub fn write(&mut self, record: &Record) {
+        let Ok(json) = serde_json::to_string(record) else { return };
+        self.is_broken |= self.pending.len() + json.len() > PENDING_BYTES_MAX;
+        if !self.is_broken {
+            // Writing to a string does not fail.
+            let _ = writeln!(self.pending, "{:08x} {json}", CRC.checksum(json.as_bytes()));
+        }
+    }
+
+    /// What was written since this was last asked.
+    pub fn take(&mut self) -> String {
+        core::mem::take(&mut self.pending)
+    }
+}
+
+/// Why a journal is of no use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum JournalError {
+    /// It has no readable begin.
+    #[error("its begin is missing or damaged")]
+    NoBegin,
+    /// Another version of the program wrote it.
+    #[error("it was written in format {0}, which this version does not read")]
+    Format(u32),
+    /// It is longer than any print's.
+    #[error("it is too long")]
+    TooLong,
+    /// The print is over.
+    #[error("its print has ended")]
+    Ended,
+}
+
+/// A journal that has been read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Journal {
+    /// The print's own number.
+    pub print: u32,
+    machine: u32,
+    clock: Hertz,
+    position: Position,
+    homed: [bool; 3],
+    /// Blocking lines that were confirmed.
+    pub confirmed: BTreeSet<u32>,
+    /// Whether all of them were.
+    pub confirm_all: bool,
+    /// The line with which the print begins, where that is not the first.
+    pub start_line: Option<u32>,
+    inputs: Vec<(Place, Input)>,
+    runs: Vec<CountedRun>,
+    /// The line of the last move that was seen to be made, and the print time then.
+    pub progress: Option<(u32, Seconds)>,
+    /// Whether the print is over.
+    pub has_ended: bool,
+    /// Bytes that could be read; what follows them was torn off or damaged.
+    pub bytes: usize,
+}
+
+/// See [`Record::Run`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct CountedRun {
+    id: u32,
+    run: u32,
+    start: u32,
+    from: [RowPlace; MOTORS],
+}
+
+impl Journal {
+    /// Reads a journal up to where it is torn off.
+    pub fn read(bytes: &[u8]) -> Result<Self, JournalError> {
+        if bytes.len() > JOURNAL_BYTES_MAX {
+            return Err(JournalError::TooLong);
+        }
+        let mut rest = bytes;
+        let mut journal = None;
+        while let Some((record, tail)) = next_record(rest) {
+            match (&mut journal, record) {
+                (None, record) => journal = Some(Self::begin(record)?),
+                (Some(journal), record) => journal.add(&record),
+            }
+            rest = tail;
+        }
+        let mut journal = journal.ok_or(JournalError::NoBegin)?;
+        journal.bytes = bytes.len() - rest.len();
+        Ok(journal)
+    }
+
+    fn begin(record: Record) -> Result<Self, JournalError> {
+        let Record::Began {
+            format,
+            print,
+            machine,
+            clock,
+            position,
+            homed,
+            confirmed,
+            confirm_all,
+            start_line,
+        } = record
+        else {
+            return Err(JournalError::NoBegin);
+        };
+        if format != FORMAT {
+            return Err(JournalError::Format(format));
+        }
+        Ok(Self {
+            print,
+            machine,
+            clock: Hertz(clock),
+            position,
+            homed,
+            confirmed,
+            confirm_all,
+            start_line,
+            inputs: Vec::new(),
+            runs: Vec::new(),
+            progress: None,
+            has_ended: false,
+            bytes: 0,
+        })
+    }
+
+    fn add(&mut self, record: &Record) {
+        match *record {
+            Record::Input { at, input } => self.inputs.push((at, input)),
+            Record::Continued { inputs } => self.inputs.truncate(inputs),
+            Record::Run { id, run, start, from } => self.runs.push(CountedRun { id, run, start, from }),
+            Record::Progress { line, elapsed } => self.progress = Some((line, Seconds(elapsed))),
+            // A second begin belongs to another print, which has no place in this journal.
+            Record::Began { .. } | Record::Ended => self.has_ended = true,
+        }
+    }
+
+    /// Whether a board that counts under this number carries out this print.
+    pub fn knows(&self, id: u32) -> bool {
+        self.runs.iter().any(|run| run.id == id)
+    }
+}
+
+/// The first record of a text, and what follows it.
+fn next_record(bytes: &[u8]) -> Option<(Record, &[u8])> {
+    let end = bytes.iter().position(|&byte| byte == b'\n')?;
+    let line = core::str::from_utf8(&bytes[..end]).ok()?;
+    let (check, json) = line.split_once(' ')?;
+    let check = (check.len() == 8).then(|| u32::from_str_radix(check, 16).ok())??;
+    let record = (CRC.checksum(json.as_bytes()) == check).then(|| serde_json::from_str(json).ok())??;
+    Some((record, &bytes[end + 1..]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn began() -> Record {
+        Record::Began {
+            format: FORMAT,
+            print: 7,
+            machine: 1,
+            clock: 12_000_000,
+            position: [0.1 + 0.2, 1.0 / 3.0, f64::MIN_POSITIVE, 4.0],
+            homed: [true, false, true],
+            confirmed: [3, 9].into(),
+            confirm_all: false,
+            start_line: None,
+        }
+    }
+
+    fn written(records: &[Record]) -> String {
+        let mut writer = Writer::default();
+        for record in records {
+            writer.write(record);
+        }
+        writer.take()
+    }
+
+    #[test]
+    fn what_was_written_is_read_to_the_last_bit() {
+        let at = Place { items: 12, drained: Some(345) };
+        let from = [RowPlace { done: 1, left: 2 }; MOTORS];
+        let records = [
+            began(),
+            Record::Input { at, input: Input::Speed(0.1 + 0.7) },
+            Record::Input { at, input: Input::FinishRun },
+            Record::Run { id: 8, run: 1, start: u32::MAX, from },
+            Record::Continued { inputs: 1 },
+            Record::Input { at, input: Input::Target(HeaterName::Bed, 60.5) },
+            Record::Progress { line: 77, elapsed: 1.5 },
+        ];
+        let text = written(&records);
+        let journal = Journal::read(text.as_bytes()).unwrap();
+        assert_eq!(
+            journal.position.map(f64::to_bits),
+            [0.1 + 0.2, 1.0 / 3.0, f64::MIN_POSITIVE, 4.0].map(f64::to_bits)
+        );
+        assert_eq!(
+            journal.inputs,
+            [(at, Input::Speed(0.1 + 0.7)), (at, Input::Target(HeaterName::Bed, 60.5))]
+        );
+        assert!(journal.knows(8) && !journal.knows(7) && !journal.has_ended);
+        assert_eq!((journal.progress, journal.bytes), (Some((77, Seconds(1.5))), text.len()));
+        assert!(Journal::read((text + &written(&[Record::Ended])).as_bytes()).unwrap().has_ended);
+    }
+
+    #[test]
+    fn what_is_none_of_ours_is_refused() {
+        let mut other = began();
+        if let Record::Began { format, .. } = &mut other {
+            *format = 2;
+        }
+        assert_eq!(Journal::read(written(&[other]).as_bytes()), Err(JournalError::Format(2)));
+        for bytes in [&b""[..], b"\n", b"00000000 {}\n", written(&[Record::Ended]).as_bytes()] {
+            assert_eq!(Journal::read(bytes), Err(JournalError::NoBegin));
+        }
+        // Two prints in one journal are none.
+        assert!(Journal::read(written(&[began(), began()]).as_bytes()).unwrap().has_ended);
+    }
+
+    #[test]
+    fn a_writer_that_nobody_reads_stops_and_says_no_more() {
+        let mut writer = Writer::default();
+        (0..100_000).for_each(|line| writer.write(&Record::Progress { line, elapsed: 0.0 }));
+        assert!(writer.take().len() <= PENDING_BYTES_MAX);
+        writer.write(&Record::Ended);
+        assert_eq!(writer.take(), "");
+    }
+
+    proptest! {
+        #[test]
+        fn damage_never_adds_anything(flips in prop::collection::vec((0..600_usize, 1..=255_u8), 1..4)) {
+            let records = [
+                began(),
+                Record::Run { id: 8, run: 1, start: 5, from: [RowPlace::default(); MOTORS] },
+                Record::Progress { line: 1, elapsed: 1.0 },
+                Record::Ended,
+            ];
+            let mut bytes = written(&records).into_bytes();
+            for (at, mask) in flips {
+                let len = bytes.len();
+                bytes[at % len] ^= mask;
+            }
+            // It is what was written up to the damage.
+            if let Ok(journal) = Journal::read(&bytes) {
+                let whole = |count: usize| Journal::read(written(&records[..count]).as_bytes()).unwrap();
+                prop_assert!((1..=4).any(|count| whole(count) == journal));
+            }
+        }
+
+        #[test]
+        fn anything_can_be_read(bytes: Vec<u8>) {
+            drop(Journal::read(&bytes));
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The journal of the present job: where its plan is, and what is written of it.
+//!
+//! Knows when something is to be written, not what it means: that is [`crate::journal`]. A job that keeps none leaves
+//! everything here at rest.
+
+use units::{Seconds, Ticks};
+use wire::Command;
+
+use super::{board::Board, job::JobOptions};
+use crate::{
+    config::PrinterConfig,
+    journal::{
+        Continuation, FORMAT, HeaterName, Input, PROGRESS_INTERVAL, Place, Record, RowPlace, Writer,
+        machine_check,
+    },
+    machine::MOTORS,
+    planner::{Planned, Planner},
+};
+
+/// The number under which the board counts what is in no journal.
+const NO_JOB: u32 = 0;
+
+/// See the module.
+#[derive(Debug, Default)]
+pub(super) struct Diary {
+    writer: Writer,
+    job: Option<Job>,
+}
+
+#[derive(Debug)]
+struct Job {
+    place: Place,
+    /// Runs of motion so far.
+    runs: u32,
+    /// The number under which the board counts.
+    id: u32,
+    told: Seconds,
+}
+
+impl Diary {
+    /// What was written since this was last asked.
+    pub(super) fn take(&mut self) -> String {
+        self.writer.take()
+    }
+
+    /// A job begins, which is journaled where it has a number.
+    pub(super) fn begin(
+        &mut self,
+        options: &JobOptions,
+        config: &PrinterConfig,
+        planner: &Planner,
+        now: Seconds,
+    ) {
+        let Some(print) = options.journal else { return };
+        self.writer.write(&Record::Began {
+            format: FORMAT,
+            print,
+            machine: machine_check(config),
+            clock: planner.clock().0,
+            position: planner.position(),
+            homed: planner.guard.homed(),
+            confirmed: options.confirmed_lines.clone(),
+            confirm_all: options.confirm_all,
+            start_line: options.start_line.filter(|&line| line > 1),
+        });
+        self.job = Some(Job { place: Place::default(), runs: 0, id: print, told: now });
+    }
+
+    /// A job is taken up again.
+    pub(super) fn take_up(&mut self, taken: &Continuation, now: Seconds) {
+        self.writer.write(&Record::Continued { inputs: taken.inputs });
+        let (place, runs, id) = (taken.place, taken.runs, taken.id);
+        for &input in &taken.adopted {
+            self.writer.write(&Record::Input { at: place, input });
+        }
+        self.job = Some(Job { place, runs, id, told: now });
+    }
+
+    /// The job is over, at rest: the board holds nothing any more that could be gone on with.
+    pub(super) fn end(&mut self, board: &mut Board) {
+        self.other_run(board);
+        if self.job.take().is_some() {
+            self.writer.write(&Record::Ended);
+        }
+    }
+
+    /// The job's planner gave an item; `fed` bytes of its file have been handed over.
+    pub(super) const fn planned(&mut self, planned: &Planned, fed: u64) {
+        let Some(job) = &mut self.job else { return };
+        if matches!(planned, Planned::NeedsInput) {
+            job.place.drained = Some(fed);
+        } else {
+            job.place = Place { items: job.place.items + 1, drained: None };
+        }
+    }
+
+    /// Something changes the job's plan here.
+    pub(super) fn input(&mut self, input: Input) {
+        if let Some(job) = &self.job {
+            self.writer.write(&Record::Input { at: job.place, input });
+        }
+    }
+
+    /// The user sets a heater.
+    pub(super) fn target(&mut self, heater: gcode::Heater, celsius: f64) {
+        let name = match heater {
+            gcode::Heater::Tool(0) => HeaterName::Nozzle,
+            gcode::Heater::Bed => HeaterName::Bed,
+            _ => return,
+        };
+        self.input(Input::Target(name, celsius));
+    }
+
+    /// A run of the job's motion begins at a motion clock: the board counts its rows.
+    pub(super) fn run(&mut self, start: Ticks, board: &mut Board) {
+        if let Some(job) = &mut self.job {
+            job.runs += 1;
+        }
+        self.count(start, [RowPlace::default(); MOTORS], board);
+    }
+
+    /// The board counts the rows of the present run anew, from there.
+    pub(super) fn count(&mut self, start: Ticks, from: [RowPlace; MOTORS], board: &mut Board) {
+        let Some(job) = self.job.as_mut().filter(|_| board.layout.has_motion_clock) else { return };
+        job.id = job.id.wrapping_add(1).max(NO_JOB + 1);
+        board.control(&Command::MotionJob { id: job.id });
+        self.writer.write(&Record::Run { id: job.id, run: job.runs, start: start.low().0, from });
+    }
+
+    /// A run begins that is none of the job's: while it is made, the job cannot be taken up.
+    pub(super) fn other_run(&self, board: &mut Board) {
+        if self.job.is_some() && board.layout.has_motion_clock {
+            board.control(&Command::MotionJob { id: NO_JOB });
+        }
+    }
+
+    /// The print got to the end of a line's move.
+    pub(super) fn progress(&mut self, line: u32, elapsed: Seconds, now: Seconds) {
+        let Some(job) = self.job.as_mut().filter(|job| now - job.told >= PROGRESS_INTERVAL) else { return };
+        job.told = now;
+        self.writer.write(&Record::Progress { line, elapsed: elapsed.0 });
+    }
+}

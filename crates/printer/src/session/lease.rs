@@ -1,0 +1,181 @@
+//! The host's lease on motion (docs/motion-clock.md): while a run of motion is made, the board is told several times a
+//! second up to where it has all steps and until when the host counts as alive. A host that is held up beyond that
+//! finds the print at rest on its path instead of lost.
+//!
+//! A run begins with a lease that covers nothing of it: without more the board holds before the first step. So there is no
+//! moment at which a host may die and leave motors to run out of steps at full speed. Of a run that is shorter than what
+//! coming to rest takes, the board has all or nothing. Homing has no lease: its triggers have a time-out of their own.
+//!
+//! Knows no G-code and no jobs. A pause that holds instead of running the queue empty would attach here: `motion_hold`
+//! and the lease's end, then the same way back as after a stall.
+
+use units::{Seconds, Ticks};
+use wire::Command;
+
+use super::{board::Board, stream::Run};
+use crate::config::PrinterConfig;
+
+/// The host counts as alive for so long after each renewal.
+const ALIVE: Seconds = Seconds(2.0);
+/// How often the lease is renewed.
+const RENEW: Seconds = Seconds(0.15);
+/// The shortest ramp between the full rate and rest …
+const RAMP_MIN: Seconds = Seconds(0.3);
+/// … which adds at most this part of a motor's acceleration to the plan's own.
+const ADDED_PART: f64 = 1.0 / 3.0;
+/// The ramp where nothing moves yet, or what moves is all there.
+const RAMP_AT_START: Seconds = Seconds(0.015);
+/// The lease covers more once there is this much more motion than what coming to rest takes: renewals take their time.
+const COVER_SPARE: Seconds = Seconds(0.5);
+/// The board says four times a second how its motion goes while there is a lease. Without a word for this long, it may
+/// have begun to hold.
+const SILENCE_MAX: Seconds = Seconds(0.7);
+/// Questions that are not answered are asked again after this long.
+const ASK_AGAIN: Seconds = Seconds(0.15);
+
+/// What the board was last told.
+#[derive(Clone, Copy, Debug)]
+struct Told {
+    at: Seconds,
+    covered: Ticks,
+    /// Hardware clock.
+    alive: Ticks,
+    has_end: bool,
+    /// Nothing of the run is covered yet.
+    at_start: bool,
+}
+
+/// The motion that may be vouched for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cover {
+    /// The board has all steps up to this motion clock.
+    pub(super) until: Ticks,
+    /// Motion comes to rest there by itself.
+    pub(super) is_end: bool,
+}
+
+/// The lease on the run that is being made.
+#[derive(Debug)]
+pub(super) struct Lease {
+    ramp: Seconds,
+    told: Option<Told>,
+    asked: Seconds,
+}
+
+impl Lease {
+    /// Of a machine. A ramp slows a speed v by v/ramp, whatever the plan does at the time.
+    pub(super) fn new(config: &PrinterConfig) -> Self {
+        let printer = &config.printer;
+        let mut limits = vec![
+            (printer.max_velocity.0, printer.max_accel.0),
+            (printer.max_z_velocity.0, printer.max_z_accel.0),
+        ];
+        limits.extend(
+            config
+                .extruder
+                .as_ref()
+                .map(|extruder| (extruder.max_extrude_only_velocity.0, extruder.max_extrude_only_accel.0)),
+        );
+        let ramps = limits.iter().map(|(velocity, accel)| velocity / (accel * ADDED_PART));
+        let ramp = Seconds(ramps.fold(RAMP_MIN.0, f64::max));
+        Self { ramp, told: None, asked: Seconds(f64::NEG_INFINITY) }
+    }
+
+    /// The time between the full rate and rest.
+    pub(super) const fn ramp(&self) -> Seconds {
+        self.ramp
+    }
+
+    /// Whether the board has a lease.
+    pub(super) const fn is_on(&self) -> bool {
+        self.told.is_some()
+    }
+
+    /// Whether the board has nothing of a run yet that it could come to rest on.
+    pub(super) fn is_at_start(&self) -> bool {
+        self.told.is_some_and(|told| told.at_start)
+    }
+
+    /// The board says nothing of its motion for too long: asks it. Whether that is so.
+    pub(super) fn is_in_doubt(&mut self, board: &mut Board, now: Seconds) -> bool {
+        let silence = board.clock_at(now).saturating_sub(board.motion.known_until());
+        if self.told.is_none() || silence < board.ticks(SILENCE_MAX) {
+            return false;
+        }
+        board.motion.doubt();
+        if now - self.asked >= ASK_AGAIN {
+            self.asked = now;
+            board.control(&Command::MotionGetState {});
+        }
+        true
+    }
+
+    /// Begins the lease, renews it, or says where it ends.
+    pub(super) fn renew(&mut self, run: Run, cover: Cover, board: &mut Board, now: Seconds) {
+        if run.homing {
+            return;
+        }
+        let Some(told) = self.told else {
+            if board.motion.is_steady() {
+                board.motion.trust(board.clock_at(now));
+                self.begin(run, board, now);
+            }
+            return;
+        };
+        if told.at_start {
+            let motion_now = board.motion_at(now).max(run.start);
+            let needed = board.ticks(Seconds(self.ramp.0 / 2.0) + COVER_SPARE);
+            if cover.until >= motion_now + needed {
+                self.tell(cover, board, now);
+            } else if cover.is_end {
+                self.lease(cover, RAMP_AT_START, board, now);
+            } else if now - told.at >= RENEW {
+                self.begin(run, board, now);
+            }
+            return;
+        }
+        let ends = cover.is_end && !told.has_end;
+        // Renewed behind its end, it would be one that covers nothing.
+        let lasts = told.has_end && board.hardware_of(told.covered, now) < told.alive;
+        if ends || !lasts && now - told.at >= RENEW {
+            self.tell(cover, board, now);
+        }
+    }
+
+    /// A lease on the time before the run.
+    fn begin(&mut self, run: Run, board: &mut Board, now: Seconds) {
+        self.lease(Cover { until: run.start, is_end: false }, RAMP_AT_START, board, now);
+        self.told.iter_mut().for_each(|told| told.at_start = true);
+    }
+
+    /// Tells the board what is covered, whatever it was told before.
+    pub(super) fn tell(&mut self, cover: Cover, board: &mut Board, now: Seconds) {
+        self.lease(cover, self.ramp, board, now);
+    }
+
+    fn lease(&mut self, cover: Cover, ramp: Seconds, board: &mut Board, now: Seconds) {
+        let covered = self.told.map_or(cover.until, |told| told.covered.max(cover.until));
+        let alive = board.clock_at(now) + board.ticks(ALIVE);
+        let ramp = board.ticks(ramp).0 as u32;
+        board.control(&Command::MotionLease { covered: covered.low().0, alive: alive.low().0, ramp });
+        let had_end = self.told.is_some_and(|told| told.has_end);
+        if cover.is_end && !had_end {
+            board.control(&Command::MotionEnd { clock: cover.until.low().0 });
+        }
+        let has_end = cover.is_end || had_end;
+        self.told = Some(Told { at: now, covered, alive, has_end, at_start: false });
+    }
+
+    /// The run has been made to its end: nothing is left over for the time until the next.
+    pub(super) fn end(&mut self, run: Run, board: &mut Board) {
+        let Some(told) = self.told.take() else { return };
+        if let Some(end) = run.end.filter(|_| !told.has_end) {
+            board.control(&Command::MotionEnd { clock: end.low().0 });
+        }
+    }
+
+    /// The board has no lease any more: it has dropped its queue, or all of that has been made.
+    pub(super) const fn forget(&mut self) {
+        self.told = None;
+    }
+}

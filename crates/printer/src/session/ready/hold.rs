@@ -1,0 +1,464 @@
+//! Motion that the board has brought to rest on its path because its host was held up: nothing is lost, and nothing goes
+//! on before the user says so.
+//!
+//! The way on is with the very next step; the way out drops the board's queue and reads where the motors stand. A board
+//! that regulates its heaters lowers them to stand-by meanwhile: to go on is to heat again first. On other boards a heater
+//! that gets no orders shuts everything down, and then nothing is held any more.
+
+use units::{Celsius, Seconds, Ticks};
+use wire::Command;
+
+use super::{Failure, Ready, Wait, take_up::Rest};
+use crate::{
+    error::{ErrorCode, PrinterError},
+    journal::MotorQueue,
+    link::SCHEDULE_AHEAD_TICKS_MAX,
+    machine::{self, MOTORS},
+    planner::ExtrusionPermit,
+    session::{
+        board::FAN_LANE,
+        event::Event,
+        job::{Job, JobState, JobStatus},
+        layout::StepperOids,
+        lease::Cover,
+        motion_time::{HoldReason, MotionReport, MotionState},
+    },
+};
+
+/// Commands that are not answered are given again after this long.
+const ASK_AGAIN: Seconds = Seconds(0.3);
+/// A board that does not say where its motors stand for this long is given up.
+const ANSWER_MAX: Seconds = Seconds(3.0);
+/// A board that still holds so long after it was told to go on did not, or holds again.
+const RESUME_MAX: Seconds = Seconds(1.5);
+/// A nozzle that has cooled by this much since the hold, in °C, is heated first.
+const COOLED_MAX_C: f64 = 10.0;
+/// Motion that is to go on is covered by this much more than what speeding up and coming to rest take.
+const COVER_SPARE: Seconds = Seconds(0.3);
+/// A pause between two calls that is worth telling.
+const GAP_MIN: Seconds = Seconds(0.5);
+/// After one so long, what was not heard of meanwhile is not silence.
+const GAP_LONG: Seconds = Seconds(3.0);
+
+/// How far a hold is.
+#[derive(Clone, Debug)]
+enum Phase {
+    /// Motion slows down.
+    Slowing,
+    /// At rest: the user decides.
+    AtRest,
+    /// The user wants to go on: what has cooled is heated again.
+    Heating,
+    /// Hot enough, with what another host began: the board drops what it has, and gets it again.
+    Rejoining { since: Seconds, asked: Seconds, answered: [bool; MOTORS] },
+    /// It may go on; since when the board has been told, if it has.
+    Resuming(Option<Ticks>),
+    /// The user wants to end it: the queue is dropped, and each motor says where it stands.
+    Dropping { since: Seconds, asked: Seconds, counts: [Option<i32>; MOTORS] },
+    /// Nothing is queued any more; the motion clock is set going again.
+    Leaving { asked: Seconds },
+}
+
+/// Motion is held.
+#[derive(Clone, Debug)]
+pub(super) struct Hold {
+    phase: Phase,
+    reason: HoldReason,
+    /// The nozzle's temperature then, and whether it was hot enough to push filament.
+    nozzle: Option<Celsius>,
+    could_extrude: bool,
+    /// What the heaters were set to.
+    targets: Vec<(gcode::Heater, Celsius)>,
+    /// The user has been told.
+    is_told: bool,
+    /// What the board has to be given again, where another host began.
+    rest: Option<Box<Rest>>,
+}
+
+impl Hold {
+    /// What comes once it is warm enough.
+    const fn warm(&self, now: Seconds) -> Phase {
+        match &self.rest {
+            Some(_) => {
+                Phase::Rejoining { since: now, asked: Seconds(f64::NEG_INFINITY), answered: [false; MOTORS] }
+            }
+            None => Phase::Resuming(None),
+        }
+    }
+}
+
+/// When the session was last called, and the longest pause since then that it has noticed.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Calls {
+    last: Option<Seconds>,
+    gap: Option<Seconds>,
+}
+
+impl Calls {
+    /// Notes a call. Whether it comes after a long pause.
+    pub(super) fn note(&mut self, now: Seconds) -> bool {
+        let gap = self.last.replace(now).map(|last| now - last).filter(|&gap| gap >= GAP_MIN);
+        self.gap = gap.or(self.gap);
+        gap.is_some_and(|gap| gap >= GAP_LONG)
+    }
+}
+
+impl Ready {
+    /// What a hold makes of a job's status; nothing where there is none.
+    pub(super) fn hold_status(&self) -> Option<JobStatus> {
+        match self.hold.as_ref()?.phase {
+            Phase::AtRest => Some(JobStatus::Held),
+            Phase::Dropping { .. } => Some(JobStatus::Ending),
+            Phase::Slowing
+            | Phase::Heating
+            | Phase::Rejoining { .. }
+            | Phase::Resuming(_)
+            | Phase::Leaving { .. } => None,
+        }
+    }
+
+    /// The board's word on its motion.
+    pub(super) fn on_motion(&mut self, report: &MotionReport, now: Seconds) {
+        let Some(clock) = self.board.on_motion(report, now) else { return };
+        if report.state == MotionState::Running {
+            if self.board.motion.is_steady() {
+                self.hold_is_over();
+            }
+            return;
+        }
+        let at_rest = report.state == MotionState::Held;
+        let slows = at_rest || report.state == MotionState::Slowing;
+        let resume_max = self.board.ticks(RESUME_MAX);
+        match &mut self.hold {
+            None if slows && report.reason != HoldReason::None && self.lease.is_on() => {
+                self.begin_hold(report.reason);
+            }
+            // Perhaps the order to go on did not reach it, or it held again: either way the user is asked again.
+            Some(hold) if slows && report.reason != HoldReason::None => match hold.phase {
+                Phase::Resuming(Some(told)) if clock > told + resume_max => {
+                    self.begin_hold(report.reason);
+                }
+                _ => {}
+            },
+            _ => {}
+        }
+        if let Some(hold) = &mut self.hold
+            && at_rest
+            && matches!(hold.phase, Phase::Slowing)
+        {
+            if hold.reason == HoldReason::QueueDry && self.lease.is_at_start() {
+                // Its run has yet to begin: it only begins a little later.
+                hold.phase = Phase::Resuming(None);
+                return;
+            }
+            hold.phase = Phase::AtRest;
+            if self.job.as_ref().is_some_and(Job::is_ending) {
+                // The user has ended it while it slowed down.
+                self.cancel_held(now);
+                return;
+            }
+            hold.is_told = true;
+            let error = match hold.rest {
+                Some(_) => ErrorCode::HeldForHost.into(),
+                None => hold_error(hold.reason, self.calls.gap.take()),
+            };
+            self.events.push(Event::Held(error));
+        }
+    }
+
+    /// Motion that another host began is held, or about to be.
+    pub(super) fn hold_for_host(&mut self, rest: Rest) {
+        self.hold = Some(Hold {
+            phase: Phase::Slowing,
+            reason: HoldReason::HostAway,
+            nozzle: None,
+            could_extrude: rest.is_nozzle_on(),
+            targets: rest.targets.clone(),
+            is_told: false,
+            rest: Some(Box::new(rest)),
+        });
+    }
+
+    fn begin_hold(&mut self, reason: HoldReason) {
+        self.hold = Some(Hold {
+            phase: Phase::Slowing,
+            reason,
+            nozzle: self.nozzle(),
+            could_extrude: self.extrusion_permit() == ExtrusionPermit::Allowed,
+            targets: self.thermal.wanted(),
+            is_told: false,
+            rest: None,
+        });
+    }
+
+    /// Motion goes at its full rate.
+    fn hold_is_over(&mut self) {
+        let is_over = |hold: &mut Hold| hold.rest.is_none() && !matches!(hold.phase, Phase::Dropping { .. });
+        let Some(hold) = self.hold.take_if(is_over) else {
+            return;
+        };
+        if hold.is_told && !matches!(hold.phase, Phase::Leaving { .. }) {
+            self.events.push(Event::Resumed);
+        }
+    }
+
+    fn nozzle(&self) -> Option<Celsius> {
+        self.thermal.heater(gcode::Heater::Tool(0)).and_then(crate::heater::Heater::temperature)
+    }
+
+    /// Goes on with what is held, with the very next step, once it is as warm as it was; `false` where nothing is held.
+    pub(super) fn resume_held(&mut self, now: Seconds) -> Result<bool, PrinterError> {
+        let Some(hold) = self.hold.take_if(|hold| matches!(hold.phase, Phase::AtRest)) else {
+            return Ok(false);
+        };
+        let nozzle = self.nozzle();
+        let has_cooled = hold.nozzle.zip(nozzle).is_some_and(|(then, now)| (then - now).0 > COOLED_MAX_C);
+        let heats = self.heat_again(&hold.targets, hold.could_extrude, has_cooled, now);
+        let phase = match heats {
+            Ok(true) => Phase::Heating,
+            Ok(false) => hold.warm(now),
+            Err(_) => Phase::AtRest,
+        };
+        self.hold = Some(Hold { phase, ..hold });
+        heats.map(|_| true)
+    }
+
+    /// Heats what has been switched off or lowered to stand-by to what it was before; whether that is to be waited for.
+    /// Refused where nothing would make a nozzle warm enough that has to be.
+    pub(super) fn heat_again(
+        &mut self,
+        before: &[(gcode::Heater, Celsius)],
+        could_extrude: bool,
+        has_cooled: bool,
+        now: Seconds,
+    ) -> Result<bool, PrinterError> {
+        let is_cold = could_extrude && (has_cooled || self.extrusion_permit() != ExtrusionPermit::Allowed);
+        let min = self.config.extruder.as_ref().map_or(Celsius::ZERO, |it| it.heater.min_extrude_temp);
+        let goal = self.thermal.goal(gcode::Heater::Tool(0), before);
+        if is_cold && (goal <= Celsius::ZERO || goal < min) {
+            let celsius = self.nozzle().unwrap_or_default().0;
+            let detail = format!("the nozzle has cooled to {celsius:.0} °C meanwhile");
+            return Err(PrinterError::new(ErrorCode::ColdExtrusion, detail));
+        }
+        let heats = self.thermal.reheat(before, &mut self.board, now)?;
+        if heats {
+            self.events.push(Event::Message("heating again before it goes on".into()));
+        }
+        Ok(heats || is_cold)
+    }
+
+    /// The board has lowered its heaters because this host was held up. What is held waits for the user anyway; all else
+    /// must not go on with them as if nothing had been.
+    pub(super) fn heaters_fell(&mut self, now: Seconds) {
+        let text =
+            "the computer did not reach the printer in time: its board lowered the heaters to stand-by";
+        self.events.push(Event::Message(text.into()));
+        match &mut self.hold {
+            Some(hold)
+                if matches!(hold.phase, Phase::Heating | Phase::Rejoining { .. } | Phase::Resuming(None)) =>
+            {
+                hold.phase = Phase::AtRest;
+                self.events.push(Event::Held(hold_error(hold.reason, self.calls.gap.take())));
+            }
+            Some(_) => {}
+            None if matches!(self.wait, Wait::Heat) => {
+                self.wait = Wait::Nothing;
+                if let Some(job) = &mut self.job {
+                    job.state = JobState::Paused;
+                }
+                self.events.push(Event::Paused);
+            }
+            None if self.job.is_some() => drop(self.pause(now)),
+            None => self.stop_typed(),
+        }
+    }
+
+    /// Ends what is held; `false` where nothing is.
+    pub(super) fn cancel_held(&mut self, now: Seconds) -> bool {
+        let may_end = |hold: &&mut Hold| {
+            matches!(
+                hold.phase,
+                Phase::AtRest | Phase::Heating | Phase::Rejoining { .. } | Phase::Resuming(None)
+            )
+        };
+        let Some(hold) = self.hold.as_mut().filter(may_end) else { return false };
+        let asked = Seconds(f64::NEG_INFINITY);
+        hold.phase = Phase::Dropping { since: now, asked, counts: [None; MOTORS] };
+        hold.rest = None;
+        self.thermal.all_off(&mut self.board, now);
+        self.board.control(&Command::MotionDrop {});
+        if let Some(job) = self.job.as_mut().filter(|job| !job.is_ending()) {
+            job.state = JobState::Cancelling;
+        }
+        true
+    }
+
+    /// A motor's answer to a dropped queue.
+    pub(super) fn on_queue(&mut self, oid: u8, queue: &MotorQueue) {
+        let is_it = |oids: &Option<StepperOids>| oids.is_some_and(|oids| oids.stepper.0 == oid);
+        let Some(motor) = self.board.layout.steppers.iter().position(is_it) else { return };
+        match self.hold.as_mut().map(|hold| &mut hold.phase) {
+            Some(Phase::Dropping { counts, .. }) => counts[motor] = Some(queue.position),
+            Some(Phase::Rejoining { answered, .. }) => answered[motor] = true,
+            _ => {}
+        }
+    }
+
+    /// Goes on with a hold.
+    pub(super) fn advance_hold(&mut self, now: Seconds) -> Result<(), Failure> {
+        let Some(mut hold) = self.hold.take() else { return Ok(()) };
+        match &mut hold.phase {
+            Phase::Slowing => {
+                if let Some(rest) = &mut hold.rest {
+                    rest.stop(self.lease.ramp(), &mut self.board, now);
+                }
+            }
+            Phase::Resuming(Some(_)) => {}
+            Phase::Rejoining { since, asked, answered } => {
+                let all = self
+                    .board
+                    .layout
+                    .steppers
+                    .iter()
+                    .zip(answered.iter())
+                    .all(|(oids, is)| oids.is_none() || *is);
+                if all {
+                    hold.phase = Phase::Resuming(None);
+                    if let Some(rest) = hold.rest.take() {
+                        self.rejoin(&rest, now);
+                    }
+                } else if now - *since > ANSWER_MAX {
+                    let detail = "it does not say where its motors stand";
+                    return Err(Failure::Stop(PrinterError::new(ErrorCode::LinkTimeout, detail)));
+                } else if now - *asked >= ASK_AGAIN {
+                    *asked = now;
+                    self.board.control(&Command::MotionDrop {});
+                    self.board.ask_queues(|motor| !answered[motor]);
+                }
+            }
+            Phase::AtRest => self.cool_down(now),
+            Phase::Heating => {
+                self.last_active = now;
+                let is_cold = self.extrusion_permit() != ExtrusionPermit::Allowed;
+                if self.thermal.is_heated() && hold.could_extrude && is_cold {
+                    // It was switched off meanwhile: that is no way to go on.
+                    hold.phase = Phase::AtRest;
+                    let detail = "the nozzle was switched off while it was heated again";
+                    self.events.push(Event::Held(PrinterError::new(ErrorCode::ColdExtrusion, detail)));
+                } else if self.thermal.is_heated() {
+                    hold.phase = hold.warm(now);
+                }
+            }
+            Phase::Resuming(told @ None) => {
+                if let Some(cover) = self.cover_to_resume(now) {
+                    self.lease.tell(cover, &mut self.board, now);
+                    let ramp = self.board.ticks(self.lease.ramp()).0 as u32;
+                    self.board.control(&Command::MotionResume { ramp });
+                    *told = Some(self.board.clock_at(now));
+                }
+            }
+            Phase::Dropping { since, asked, counts } => {
+                let all = core::array::from_fn(|motor| match self.board.layout.steppers[motor] {
+                    Some(_) => counts[motor],
+                    None => Some(0),
+                });
+                if let [Some(x), Some(y), Some(z), Some(e)] = all {
+                    self.stand_at(&[x, y, z, e], now);
+                    hold.phase = Phase::Leaving { asked: Seconds(f64::NEG_INFINITY) };
+                } else if now - *since > ANSWER_MAX {
+                    let detail = "it does not say where its motors stand";
+                    return Err(Failure::Stop(PrinterError::new(ErrorCode::LinkTimeout, detail)));
+                } else if now - *asked >= ASK_AGAIN {
+                    *asked = now;
+                    // Only those who have not answered: a small board has no room for all answers at once.
+                    self.board.ask_queues(|motor| counts[motor].is_none());
+                }
+            }
+            Phase::Leaving { asked } => {
+                if now - *asked >= ASK_AGAIN {
+                    *asked = now;
+                    self.board.control(&Command::MotionResume { ramp: 0 });
+                }
+            }
+        }
+        self.hold = Some(hold);
+        Ok(())
+    }
+
+    /// Whether the board is in a run that another host began, and has not been given its steps again: until the user
+    /// says so, nothing of the plan may take effect.
+    pub(super) fn waits_to_rejoin(&self) -> bool {
+        self.hold.as_ref().is_some_and(|hold| hold.rest.is_some())
+    }
+
+    /// Nobody decides for too long.
+    fn cool_down(&mut self, now: Seconds) {
+        if now - self.last_active >= self.config.idle_timeout.timeout && self.thermal.any_target() {
+            self.thermal.all_off(&mut self.board, now);
+            self.events.push(Event::Message("held for too long: heaters are off".into()));
+        }
+    }
+
+    /// What the board has, once it is enough to speed up on and come to rest again.
+    fn cover_to_resume(&self, now: Seconds) -> Option<Cover> {
+        let motion_now = self.board.motion_at(now);
+        let Some(run) = self.stream.run() else {
+            // It was held on the last steps of a run that was taken for done.
+            return Some(Cover { until: motion_now, is_end: true });
+        };
+        let cover = self.cover(run.end, now)?;
+        let enough = motion_now + self.board.ticks(self.lease.ramp() + COVER_SPARE);
+        (cover.is_end || cover.until >= enough).then_some(cover)
+    }
+
+    fn cover(&self, end: Option<Ticks>, now: Seconds) -> Option<Cover> {
+        let covered = self.stream.covered(self.planner.generated_until(), &self.board)?;
+        // A single row may last for minutes, which the board's clock cannot compare.
+        let until = covered.min(self.board.motion_at(now) + SCHEDULE_AHEAD_TICKS_MAX);
+        Some(Cover { until, is_end: end.is_some_and(|end| until >= end) })
+    }
+
+    /// Keeps the lease on the run that is being made.
+    pub(super) fn renew_lease(&mut self, now: Seconds) {
+        let may = matches!(self.hold, None | Some(Hold { phase: Phase::Resuming(Some(_)), .. }));
+        if let Some(run) = self.stream.run().filter(|_| may && self.board.layout.has_motion_clock)
+            && let Some(cover) = self.cover(run.end, now)
+        {
+            self.lease.renew(run, cover, &mut self.board, now);
+        }
+    }
+
+    /// The queue has been dropped: the machine stands where its motors' counts say.
+    fn stand_at(&mut self, counts: &[i32; MOTORS], now: Seconds) {
+        let steps_mm = machine::step_distances(&self.config).map(|distance| distance.0);
+        let position = self.stream.position_of(*counts, steps_mm, &self.board);
+        self.planner.abandon_run();
+        self.board.link.forget_motion(FAN_LANE as u8);
+        if self.stream.abandon(&mut self.board) {
+            self.events.push(Event::RunBroken { at: self.board.motion_at(now) });
+        }
+        for (motor, &count) in counts.iter().enumerate() {
+            self.stream.set_count(motor, count);
+        }
+        self.planner.stand_at(position);
+        self.console.clear();
+        self.planner.correct(&mut self.console.source);
+        self.thermal.forget_fan_orders();
+        self.thermal.set_fan(0.0, None, &mut self.board, now);
+        self.lease.forget();
+    }
+}
+
+/// What the user is told of a hold.
+fn hold_error(reason: HoldReason, gap: Option<Seconds>) -> PrinterError {
+    match (reason, gap) {
+        (HoldReason::HostAway, Some(gap)) => {
+            PrinterError::new(ErrorCode::HeldHostAway, format!("it was away for {:.1} s", gap.0))
+        }
+        (HoldReason::HostAway, None) => ErrorCode::HeldHostAway.into(),
+        (_, Some(gap)) => {
+            PrinterError::new(ErrorCode::HeldQueueDry, format!("the computer was away for {:.1} s", gap.0))
+        }
+        (_, None) => ErrorCode::HeldQueueDry.into(),
+    }
+}

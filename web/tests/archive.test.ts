@@ -1,0 +1,215 @@
+// What is kept of prints: the journal before anything else, the file beside it, and nothing of what has ended. Whatever
+// fails is said once and stops no print.
+import { beforeEach, expect, test } from 'vitest';
+import { type About, Archive, type PrintLog } from '../src/machine/archive';
+import type { Trouble } from '../src/machine/protocol';
+import type { JournalSummary } from '../src/machine/session';
+import { PrintStore } from '../src/machine/storage';
+import { seconds } from '../src/units';
+import { FakeDisk } from './fake_files';
+import { FakeLocks } from './fake_locks';
+
+const ABOUT: About = {
+  facts: { name: 'part.gcode', time: seconds(60), lines: 100 },
+  machine: { name: 'Mill', config: '[printer]' },
+  port: { vendor: 1, product: 2, index: 0 },
+  fileBytes: 4,
+};
+
+/** A journal of this test: numbers by spaces, the first the print's own; what follows a hash is torn off. */
+function read(journal: Uint8Array, held: number | null): JournalSummary | null {
+  const text = Buffer.from(journal).toString().replace(/#.*/s, '');
+  const numbers = text.split(' ').map(Number);
+  const [number = Number.NaN] = numbers;
+  if (text === '' || Number.isNaN(number)) return null;
+  return {
+    number,
+    hasEnded: numbers.includes(-1),
+    isHeld: held !== null && numbers.includes(held),
+    line: numbers.length,
+    elapsed: seconds(1),
+    readableBytes: text.length,
+  };
+}
+
+let disk: FakeDisk;
+let locks: FakeLocks;
+let store: PrintStore;
+let archive: Archive;
+let told: Trouble[];
+const tell = (trouble: Trouble): void => void told.push(trouble);
+const file = new Blob(['G28\n']);
+
+beforeEach(() => {
+  disk = new FakeDisk();
+  locks = new FakeLocks();
+  told = [];
+  store = new PrintStore(
+    () => disk.handle(),
+    async () => disk.bytesMax - disk.used,
+  );
+  archive = new Archive(store, read, locks);
+});
+
+async function begun(about = ABOUT): Promise<PrintLog> {
+  const log = await archive.begin(about, tell);
+  if (!log) throw new Error('it was not begun');
+  return log;
+}
+
+/** The page is gone without a word: nothing is closed in order, and the browser lets go of everything. */
+async function interrupted(log: PrintLog): Promise<void> {
+  await log.close();
+}
+
+test('a print that was interrupted is found again, with all there is to know of it', async () => {
+  const log = await begun();
+  archive.copy(log, file);
+  log.append(`${log.number} 7 `);
+  log.append('8 ');
+  expect(await archive.list(), 'it is under way').toEqual([]);
+  await expect.poll(() => store.openFile(log.id).then((copy) => copy.text(), String)).toBe('G28\n');
+  await interrupted(log);
+  const [print] = await archive.list();
+  expect(print).toMatchObject({ ...ABOUT, id: log.id, line: 4 });
+  const found = await archive.find(8);
+  expect(found?.print).toMatchObject(ABOUT);
+  expect(await archive.find(9)).toBeNull();
+  if (!found) throw new Error('not found');
+  expect(await (await archive.openFile(found.print))?.text()).toBe('G28\n');
+  expect(told).toEqual([]);
+});
+
+test('what is added to a torn journal follows what can be read', async () => {
+  const log = await begun();
+  log.append('5 6#torn');
+  await interrupted(log);
+  const found = await archive.find(6);
+  if (!found) throw new Error('not found');
+  const again = await archive.reopen(found, tell);
+  again.append(' 7');
+  expect(Buffer.from(await store.readJournal(log.id)).toString()).toBe('5 6 7');
+});
+
+test('one tab at a time has a print', async () => {
+  const log = await begun();
+  log.append('5 6');
+  const found = await archive.find(6);
+  if (!found) throw new Error('not found');
+  await expect(archive.reopen(found, tell)).rejects.toMatchObject({ code: 'in-use' });
+  await interrupted(log);
+  expect((await archive.reopen(found, tell)).id).toBe(log.id);
+});
+
+test('what has come to its end is not kept, what was only left is', async () => {
+  const [done, lost, left] = [await begun(), await begun(), await begun()];
+  done.append('5 6 -1');
+  lost.append('15 16');
+  left.append('25 26');
+  await archive.settle(done, false);
+  await archive.settle(lost, true);
+  await archive.settle(left, false);
+  expect((await archive.list()).map(({ id }) => id)).toEqual([left.id]);
+  expect((await store.listPrints()).map(({ id }) => id)).toEqual([left.id]);
+  expect(locks.names.size).toBe(0);
+  await archive.forget(left.id);
+  expect(await archive.list()).toEqual([]);
+});
+
+test('a record that cannot be read for now is not thrown away for that', async () => {
+  const log = await begun();
+  log.append('5 6');
+  const { readJournal } = store;
+  store.readJournal = () => Promise.reject(new DOMException('busy', 'UnknownError'));
+  await archive.settle(log, false);
+  expect(await archive.list()).toEqual([]);
+  store.readJournal = readJournal;
+  expect((await archive.list()).map(({ id }) => id)).toEqual([log.id]);
+});
+
+test('a record in which nothing was written, or whose print has ended, is put away with the list', async () => {
+  const [empty, ended, odd] = [await begun(), await begun(), await begun()];
+  ended.append('5 -1');
+  odd.append('of another version');
+  for (const log of [empty, ended, odd]) await interrupted(log);
+  expect(await archive.list()).toEqual([]);
+  // Another version may be able to read it.
+  expect((await store.listPrints()).map(({ id }) => id)).toEqual([odd.id]);
+});
+
+test('numbers of prints keep apart', async () => {
+  const numbers: number[] = [];
+  for (let count = 0; count < 6; count += 1) {
+    const log = await begun();
+    log.append(`${log.number}`);
+    numbers.push(log.number);
+  }
+  for (const [index, one] of numbers.entries()) {
+    expect(one).toBeGreaterThan(0);
+    expect(one).toBeLessThan(2 ** 32 - 2 ** 20);
+    for (const other of numbers.slice(index + 1)) expect(Math.abs(one - other)).toBeGreaterThan(2 ** 20);
+  }
+});
+
+test('where nothing can be stored, the print begins without and it is said', async () => {
+  const closed = new Archive(
+    new PrintStore(async () => {
+      throw new DOMException('private window', 'SecurityError');
+    }),
+    read,
+    locks,
+  );
+  expect(await closed.begin(ABOUT, tell)).toBeNull();
+  expect(told.map(({ code }) => code)).toEqual(['storage-unavailable']);
+  expect(told[0]?.safe).toContain('not touched');
+  expect(await closed.list()).toEqual([]);
+  expect(locks.names.size).toBe(0);
+});
+
+test('a journal that cannot be gone on with is left alone, and that is said once', async () => {
+  const log = await begun();
+  log.append('5 6');
+  disk.bytesMax = disk.used;
+  log.append(' 7');
+  disk.bytesMax = Number.POSITIVE_INFINITY;
+  log.append(' 8');
+  expect(told.map(({ code }) => code)).toEqual(['storage-full']);
+  expect(Buffer.from(await store.readJournal(log.id)).toString()).toBe('5 6');
+});
+
+test('without room for a copy the file is asked for again, and known again', async () => {
+  disk.bytesMax = 1024 * 1024;
+  const log = await begun();
+  log.append('5 6');
+  archive.copy(log, file);
+  await expect.poll(() => told.map(({ code }) => code)).toEqual(['copy-missing']);
+  await interrupted(log);
+  const found = await archive.find(6);
+  if (!found) throw new Error('not found');
+  expect(await archive.openFile(found.print)).toBeNull();
+  expect(await archive.isItsFile(found.print, file)).toBe(true);
+  expect(await archive.isItsFile(found.print, new Blob(['G29\n']))).toBe(false);
+  expect(await archive.isItsFile(found.print, new Blob(['G28\nG1']))).toBe(false);
+});
+
+test('a file that does not come holds nothing up', async () => {
+  const log = await begun();
+  log.append('5 6');
+  const stuck = new Blob(['G28']);
+  Object.defineProperty(stuck, 'stream', { value: () => new ReadableStream() });
+  archive.copy(log, stuck);
+  await interrupted(log);
+  expect(locks.names.size).toBe(0);
+  expect(told).toEqual([]);
+});
+
+test('a copy that was broken off is none', async () => {
+  const log = await begun();
+  log.append('5 6');
+  archive.copy(log, new Blob([new Uint8Array(1_000_000)]));
+  await interrupted(log);
+  const found = await archive.find(6);
+  if (!found) throw new Error('not found');
+  expect(await archive.openFile(found.print)).toBeNull();
+  expect(told).toEqual([]);
+});
