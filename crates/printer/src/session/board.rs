@@ -45,6 +45,8 @@ pub(super) struct Board {
     pub(super) losses: Losses,
     /// The clock of steps.
     pub(super) motion: MotionTime,
+    /// It has started with its power, as far as is known: nobody has had it start anew.
+    pub(super) since_power_up: bool,
 }
 
 /// When the link last had to send something again.
@@ -188,6 +190,7 @@ impl Board {
         link.set_board(profile.clock, 1000);
         let losses = Losses::default();
         let motion = MotionTime::default();
-        Self { link, dictionary, sync, clock: profile.clock, adc_max: 4095.0, layout, losses, motion }
+        let (clock, adc_max, since_power_up) = (profile.clock, 4095.0, true);
+        Self { link, dictionary, sync, clock, adc_max, layout, losses, motion, since_power_up }
     }
 }

@@ -279,6 +279,7 @@ impl Ready {
         }
         self.advance_wait(now);
         self.advance_hold(now)?;
+        self.diary.tell_progress(now);
         self.pump(now)?;
         self.renew_lease(now);
         self.rest(now);
@@ -290,7 +291,7 @@ impl Ready {
             Due::MoveEnd(made) => {
                 let elapsed = self.stream.elapsed(made.end, &self.board);
                 if made.line > 0 && self.plans_job() {
-                    self.diary.progress(made.line, elapsed, now);
+                    self.diary.progress(made.line, elapsed);
                 }
                 if let Some(job) =
                     self.job.as_mut().filter(|job| made.line > 0 && now - job.told >= PROGRESS_INTERVAL)
