@@ -160,6 +160,9 @@ impl Ready {
         // After a long pause nothing may be claimed of the motion clock, whose 32 bits say little then.
         self.lease.is_in_doubt(&mut self.board, now);
         for (message, sent) in inbox::receive(&mut self.board.link, &self.board.dictionary, bytes, now) {
+            if let Some(sent) = sent {
+                self.board.said_after = self.board.said_after.max(sent);
+            }
             self.on_message(message, sent, now)?;
         }
         Ok(())
