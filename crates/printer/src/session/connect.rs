@@ -230,6 +230,7 @@ impl Connecting {
             losses: Losses::default(),
             motion: MotionTime::default(),
             since_power_up,
+            said_after: Seconds(f64::NEG_INFINITY),
         };
         if let Some(window) = window {
             board.link.set_receive_window(window as usize);

@@ -91,18 +91,14 @@ impl Lease {
         self.told.is_some()
     }
 
-    /// Whether the board has nothing of a run yet that it could come to rest on.
-    pub(super) fn is_at_start(&self) -> bool {
-        self.told.is_some_and(|told| told.at_start)
-    }
-
     /// The board says nothing of its motion for too long: asks it. Whether that is so.
     pub(super) fn is_in_doubt(&mut self, board: &mut Board, now: Seconds) -> bool {
-        let silence = board.clock_at(now).saturating_sub(board.motion.known_until());
+        let clock_now = board.clock_at(now);
+        let silence = clock_now.saturating_sub(board.motion.known_until());
         if self.told.is_none() || silence < board.ticks(SILENCE_MAX) {
             return false;
         }
-        board.motion.doubt();
+        board.motion.doubt(clock_now);
         if now - self.asked >= ASK_AGAIN {
             self.asked = now;
             board.control(&Command::MotionGetState {});

@@ -16,6 +16,7 @@ use units::{Celsius, Hertz, Seconds, Ticks};
 use virtual_printer::{BoardProfile, Faults, HeaterView, HostStall, State, VirtualPrinter};
 
 use super::{
+    course::Course,
     lease_tap::LeaseTap,
     observer::{Observer, Wish},
     own_error,
@@ -99,6 +100,8 @@ pub(crate) struct Setup {
     pub(crate) successor: Option<Successor>,
     /// The machine is watched for so long after the end.
     pub(crate) watched: Seconds,
+    /// A print that has not ended after so long is given up as failed.
+    pub(crate) time_max: Option<Seconds>,
     /// Nothing is shown on the terminal.
     pub(crate) quiet: bool,
 }
@@ -160,11 +163,15 @@ pub(crate) struct Simulation {
     stalls: Vec<(Ticks, Ticks)>,
     stage: Stage,
     watched: Seconds,
+    time_max: Option<Seconds>,
+    /// It has been given up for taking longer.
+    is_overdue: bool,
     quiet: bool,
     /// The temperatures at which heaters are safe without a host.
     standby: [(&'static str, Celsius); 2],
     lease: LeaseTap,
     aftermath: Aftermath,
+    course: Course,
     next_sample: Ticks,
     seed: u64,
     path_error_max_mm: f64,
@@ -185,6 +192,7 @@ impl Simulation {
             host_dies,
             successor,
             watched,
+            time_max,
             quiet,
         } = setup;
         let board = demo_machine::fit(&mut config, board.as_ref())?;
@@ -218,10 +226,13 @@ impl Simulation {
             stalls: stalls(&faults.host_stalls, start, host_hz),
             stage: Stage::Connecting,
             watched,
+            time_max,
+            is_overdue: false,
             quiet,
             standby,
             lease: LeaseTap::default(),
             aftermath: Aftermath { start, ..Aftermath::default() },
+            course: Course::default(),
             next_sample: start,
             seed,
             path_error_max_mm: PATH_ERROR_MAX_MM.max((x * x + y * y + z * z).sqrt()),
@@ -249,6 +260,7 @@ impl Simulation {
                 break;
             }
             self.check_stall()?;
+            self.give_up_late();
             let now = self.printer.now();
             let earliest = now + self.ticks(WAKE_MIN);
             let until = self.clock.ticks_at(wake).max(earliest).min(self.next_sample.max(earliest));
@@ -284,7 +296,11 @@ impl Simulation {
             let acted = self.take_events(now) | self.consent(now);
             let fed = self.feed()?;
             if !acted && !fed {
-                self.observer.queued(self.session.motion_queued(now));
+                let queued = self.session.motion_queued(now);
+                self.observer.queued(queued);
+                if let Some(ahead) = queued {
+                    self.course.queued(ahead);
+                }
                 let consent = self.consent_at.map(|at| self.clock.at(at));
                 return Ok(consent.map_or(wake, |consent| wake.min(consent)));
             }
@@ -418,11 +434,23 @@ impl Simulation {
             self.aftermath.overheated = now;
         }
         let time = self.clock.at(now);
+        self.follow(motion_now, time);
         if self.stage == Stage::Printing
             && let Some(nozzle) = state.heaters.iter().find(|heater| heater.name == MOTOR_NAMES[EXTRUDER])
         {
             self.observer.nozzle.sample(time, nozzle.temperature, extruding);
         }
+    }
+
+    /// How the host's idea of the board's clock fares, and what else may not grow.
+    fn follow(&mut self, motion_now: Ticks, time: Seconds) {
+        if self.away_until().is_none()
+            && let Some(believed) = self.session.motion_clock(time)
+        {
+            let error = believed.0 as f64 - motion_now.0 as f64;
+            self.course.clock_error(Seconds(error / f64::from(self.printer.profile().clock.0)));
+        }
+        self.course.pass(self.virtual_time(), self.journal.len());
     }
 
     /// Until when the host does nothing, if it is held up now or gone.
@@ -451,6 +479,14 @@ impl Simulation {
             );
         }
         Ok(())
+    }
+
+    fn give_up_late(&mut self) {
+        let is_late = self.time_max.is_some_and(|max| self.virtual_time() > max);
+        if is_late && !matches!(self.stage, Stage::Watching(_)) {
+            self.is_overdue = true;
+            self.end();
+        }
     }
 
     fn ticks(&self, duration: Seconds) -> Ticks {
@@ -499,7 +535,8 @@ impl Simulation {
             shutdown: state.shutdown.map(|reason| reason.text().to_owned()),
         };
         let motors = motors(&self.observer, tally, &state);
-        let error = self.observer.session_error().or_else(|| {
+        let overdue = self.is_overdue.then(|| own_error("no-end", "it was given up: it did not end in time"));
+        let error = overdue.or_else(|| self.observer.session_error()).or_else(|| {
             wrong(&self.observer, tally, &motors, self.path_error_max_mm)
                 .map(|found| own_error("wrong-pulses", found))
         });
@@ -531,6 +568,7 @@ impl Simulation {
             pauses: self.observer.pauses,
             holds: self.observer.holds,
             after: self.after,
+            course: self.course.finish(virtual_time, self.journal.len()),
             motors,
         }
     }

@@ -164,6 +164,9 @@ impl Ready {
             self.diary.heard(now);
         }
         for (message, sent) in messages {
+            if let Some(sent) = sent {
+                self.board.said_after = self.board.said_after.max(sent);
+            }
             self.on_message(message, sent, now)?;
         }
         Ok(())
