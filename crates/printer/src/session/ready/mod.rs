@@ -33,6 +33,7 @@ use super::{
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
+    journal::Input,
     machine,
     planner::{Planner, Source, TimedAction},
 };
@@ -311,6 +312,14 @@ impl Ready {
         }
     }
 
+    /// What heaters and fan have been set to before a job begins holds until its file says something else.
+    pub(super) fn note_preheating(&mut self) {
+        for (heater, target) in self.thermal.wanted() {
+            self.diary.target(heater, target.0);
+        }
+        self.diary.input(Input::Fan(self.thermal.fan_speed()));
+    }
+
     /// Whether a job that has been ended may still do this: what was read of it ahead must not switch anything on.
     fn is_allowed(&self, action: &TimedAction) -> bool {
         let is_ending = self.job.as_ref().is_some_and(Job::is_ending);
@@ -331,7 +340,12 @@ impl Ready {
                 }
             }
             TimedAction::TurnOffHeaters => self.thermal.all_off(&mut self.board, now),
-            TimedAction::Fan { speed, .. } => self.thermal.set_fan(speed, None, &mut self.board, now),
+            TimedAction::Fan { speed, .. } => {
+                if !self.plans_job() {
+                    self.diary.input(Input::Fan(speed));
+                }
+                self.thermal.set_fan(speed, None, &mut self.board, now);
+            }
             TimedAction::Message(text) => self.events.push(Event::Message(text)),
             TimedAction::Annotation(annotation) => self.events.push(Event::Annotation(annotation)),
             TimedAction::Object(object) => self.events.push(Event::Object(object)),

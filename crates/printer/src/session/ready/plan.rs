@@ -192,7 +192,12 @@ impl Ready {
         let clock = run.start + self.board.ticks(at);
         match action {
             // The board itself does it at that clock.
-            TimedAction::Fan { speed, .. } => self.thermal.set_fan(speed, Some(clock), &mut self.board, now),
+            TimedAction::Fan { speed, .. } => {
+                if !self.plans_job() {
+                    self.diary.input(Input::Fan(speed));
+                }
+                self.thermal.set_fan(speed, Some(clock), &mut self.board, now);
+            }
             action => self.stream.schedule(clock, Due::Action(line, action)),
         }
     }
