@@ -31,6 +31,10 @@ pub(super) struct Finding {
     pub(super) wrong_resumes: u32,
     pub(super) restarts_without_consent: u32,
     pub(super) holds: u32,
+    /// How far what was printed after a loss of power is from its height.
+    pub(super) z_error_mm: Option<f64>,
+    /// The user had to measure Z.
+    pub(super) measured: u32,
     /// What was promised and did not come.
     pub(super) broken: Vec<String>,
 }

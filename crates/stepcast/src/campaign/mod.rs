@@ -6,6 +6,7 @@
 
 mod chance;
 mod judge;
+mod power_loss;
 mod report;
 mod scenario;
 mod window;
@@ -32,7 +33,7 @@ use virtual_printer::BoardProfile;
 pub(crate) use self::scenario::Scenario;
 use self::{
     chance::Chance,
-    judge::{Print, judge},
+    judge::{Finding, Print, judge},
     report::{Broken, Class},
     scenario::{Case, Times},
     window::{Source, Window},
@@ -170,6 +171,10 @@ impl Campaign {
         for &scenario in &self.scenarios {
             let mut chance = Chance::new(seed, SCENARIO_STREAM + scenario as u64);
             let board = scenario.board(&mut chance);
+            if scenario == Scenario::PowerLoss {
+                self.lose_power(seed, &board, &mut chance, classes)?;
+                continue;
+            }
             if clean.iter().all(|(known, _)| *known != board) {
                 clean.push((board.clone(), self.clean(&window, &board, seed)?));
             }
@@ -178,11 +183,7 @@ impl Campaign {
             let case = scenario.case(board, times, &mut chance);
             let print = self.print(&window, &case, seed, WATCHED)?;
             let finding = judge(&case, clean, &print, STANDBY);
-            if let Some(folder) = self.save.as_ref().filter(|_| !finding.broken.is_empty()) {
-                let path = folder.join(format!("{seed}.gcode"));
-                fs::write(&path, &window.gcode)
-                    .with_context(|| format!("cannot write {}", path.display()))?;
-            }
+            self.save(seed, &window, &finding)?;
             if let Some(class) = lock(classes).get_mut(&scenario) {
                 class.add(&finding, |what| Broken {
                     seed,
@@ -194,6 +195,37 @@ impl Campaign {
             }
         }
         Ok(())
+    }
+
+    /// A window of a file, since a part is to be seen, that loses its power.
+    fn lose_power(
+        &self,
+        seed: u64,
+        board: &BoardProfile,
+        chance: &mut Chance,
+        classes: &Mutex<BTreeMap<Scenario, Class>>,
+    ) -> anyhow::Result<()> {
+        let window = chance.pick(&self.sources).window(chance);
+        let power_loss::Judged { finding, about } =
+            power_loss::run(&self.config, &window, board, seed, chance)?;
+        self.save(seed, &window, &finding)?;
+        if let Some(class) = lock(classes).get_mut(&Scenario::PowerLoss) {
+            class.add(&finding, |what| Broken {
+                seed,
+                board: board_name(board),
+                window: window.name.clone(),
+                faults: about,
+                what,
+            });
+        }
+        Ok(())
+    }
+
+    /// Keeps what broke a promise, where that is wanted.
+    fn save(&self, seed: u64, window: &Window, finding: &Finding) -> anyhow::Result<()> {
+        let Some(folder) = self.save.as_ref().filter(|_| !finding.broken.is_empty()) else { return Ok(()) };
+        let path = folder.join(format!("{seed}.gcode"));
+        fs::write(&path, &window.gcode).with_context(|| format!("cannot write {}", path.display()))
     }
 
     /// The print without a fault, which has to be sound for anything to be learned from it.

@@ -24,6 +24,10 @@ pub(super) struct Class {
     restarts_without_consent: u32,
     /// How often the board held its motion.
     holds: u32,
+    /// Of what was printed after a loss of power, from its height; `null` where none was.
+    z_error_max_mm: Option<f64>,
+    /// How often the user had to measure where Z stands.
+    measured: u32,
     /// Prints that did not keep what is promised.
     broken: u32,
     broken_runs: Vec<Broken>,
@@ -52,6 +56,8 @@ impl Class {
             wrong_resumes: 0,
             restarts_without_consent: 0,
             holds: 0,
+            z_error_max_mm: None,
+            measured: 0,
             broken: 0,
             broken_runs: Vec::new(),
         }
@@ -72,6 +78,8 @@ impl Class {
         self.wrong_resumes += finding.wrong_resumes;
         self.restarts_without_consent += finding.restarts_without_consent;
         self.holds += finding.holds;
+        most(&mut self.z_error_max_mm, finding.z_error_mm);
+        self.measured += finding.measured;
         if !finding.broken.is_empty() {
             self.broken += 1;
             if self.broken_runs.len() < BROKEN_SHOWN_MAX {
@@ -122,6 +130,9 @@ pub(super) fn text(classes: &[Class]) -> String {
             seconds(class.time_to_safe_heaters_max_s),
             class.wrong_resumes,
         );
+        if let Some(z) = class.z_error_max_mm {
+            let _ = writeln!(text, "  Z {z:.4} mm off at most, measured {} times", class.measured);
+        }
         for broken in &class.broken_runs {
             let Broken { seed, board, window, faults, what } = broken;
             let _ = writeln!(text, "  --seed {seed}: {} ({window}, {board}, {faults})", what.join("; "));

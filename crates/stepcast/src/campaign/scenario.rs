@@ -56,6 +56,8 @@ pub(crate) enum Scenario {
     PlainHostDeath,
     /// The host of a board with plain firmware does nothing for a while
     PlainStall,
+    /// The power goes, and the print is gone on with from a line
+    PowerLoss,
 }
 
 /// What has to come of it.
@@ -120,7 +122,7 @@ impl Scenario {
     const fn is_plain(self) -> Option<bool> {
         match self {
             Self::Flip | Self::PlainHostDeath | Self::PlainStall => Some(true),
-            Self::Drop | Self::Duplicate | Self::Delay => None,
+            Self::Drop | Self::Duplicate | Self::Delay | Self::PowerLoss => None,
             Self::Corrupt
             | Self::Stall
             | Self::HostDeath
@@ -159,6 +161,8 @@ impl Scenario {
                 case.consent_after = Some(Seconds(chance.between(CONSENT_S)));
                 case.promise = if torn { Promise::SameStepsOrRefused } else { Promise::SameSteps };
             }
+            // What happens there has a judge of its own.
+            Self::PowerLoss => {}
             Self::BoardReset | Self::SensorFault => {
                 let kind = if self == Self::BoardReset { FailureKind::BoardReset } else { sensor(chance) };
                 case.faults.failures.push(Failure { at, kind });

@@ -26,7 +26,7 @@ use units::Seconds;
 
 pub(crate) use self::{
     report::{Outcome, Report},
-    run::{Aftermath, PATH_ERROR_MAX_MM, Setup, Simulation, Successor},
+    run::{Aftermath, HostClock, PATH_ERROR_MAX_MM, Setup, Simulation, Successor},
 };
 use crate::{
     check,

@@ -51,22 +51,22 @@ const ROUNDS_PER_DRAW: u32 = 256;
 
 /// The host's clock, as the board's tells it.
 #[derive(Clone, Copy, Debug)]
-struct HostClock {
+pub(crate) struct HostClock {
     start: Ticks,
     ticks_per_s: f64,
 }
 
 impl HostClock {
-    fn new(start: Ticks, clock: Hertz) -> Self {
+    pub(crate) fn new(start: Ticks, clock: Hertz) -> Self {
         Self { start, ticks_per_s: f64::from(clock.0) * (1.0 + CRYSTAL_ERROR) }
     }
 
-    fn at(self, now: Ticks) -> Seconds {
+    pub(crate) fn at(self, now: Ticks) -> Seconds {
         Seconds(HOST_START.0 + now.saturating_sub(self.start).0 as f64 / self.ticks_per_s)
     }
 
     /// The first tick at or after a time.
-    fn ticks_at(self, time: Seconds) -> Ticks {
+    pub(crate) fn ticks_at(self, time: Seconds) -> Ticks {
         Ticks(self.start.0 + ((time - HOST_START).0 * self.ticks_per_s).ceil().max(0.0) as u64)
     }
 }
