@@ -138,6 +138,12 @@ pub(crate) struct SimulateArgs {
     /// Print although lines have commands that are not known
     #[arg(long)]
     pub(crate) confirm_all: bool,
+    /// Begin with this line, as if those before had been made
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "repeat")]
+    pub(crate) start_line: Option<u32>,
+    /// Begin with the first line of this layer; the lowest is 1
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with_all = ["start_line", "repeat"])]
+    pub(crate) start_layer: Option<u32>,
     /// Print the file so many times, one after the other, as one print
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) repeat: u32,

@@ -38,7 +38,7 @@ const FINER: u64 = 16;
 const CURRENT_TIME_CONSTANT_S: f64 = 0.001;
 /// A rotor this near to the middle between two places that its driver could pull it to, in electrical periods, is pulled by
 /// too little to overcome friction.
-const BALANCE_PERIODS: f64 = 0.04;
+const BALANCE_PERIODS: f64 = 0.06;
 /// Least dry friction: without any, a rotor would swing for ever.
 const FRICTION_NM_MIN: f64 = 1e-4;
 
@@ -193,6 +193,8 @@ pub(crate) struct MotorState {
     /// Speed of the field as the current sees it, in microsteps/s.
     rate: f64,
     energised: bool,
+    /// The driver has got its power back, and the motor no current since then; which way it goes where it could go either.
+    begins_anew: Option<bool>,
     settled: bool,
     stops: Stops,
     /// The limit switches on this motor's axis.
@@ -278,6 +280,7 @@ impl MotorState {
             velocity: 0.0,
             rate: 0.0,
             energised: false,
+            begins_anew: None,
             settled: true,
             stops,
             switches: Vec::new(),
@@ -305,6 +308,9 @@ impl MotorState {
     pub(crate) fn energise(&mut self, now: u64, on: bool) {
         self.advance(now);
         if self.energised != on {
+            if let Some(upwards) = self.begins_anew.take_if(|_| on) {
+                self.pull_in(upwards);
+            }
             self.energised = on;
             self.settled = false;
         }
@@ -317,11 +323,17 @@ impl MotorState {
         self.settled = false;
     }
 
-    /// The power is back: the driver begins at the first place of its table, and counts as standing at the nearest such
-    /// place from the rotor. One that stands in the middle between two goes where chance has it.
+    /// The power is back: the driver begins at the first place of its table, wherever the rotor stands.
     pub(crate) fn regain_power(&mut self, now: u64, upwards: bool) {
         self.advance(now);
-        let turns = self.rotor * self.model.per_period;
+        (self.field, self.chunk_field, self.weight, self.rate) = (0, 0, 0, 0.0);
+        self.begins_anew = Some(upwards);
+    }
+
+    /// The first current since then pulls the rotor to the nearest place that the coils' is like: from there on it counts.
+    /// One that stands in the middle between two goes where chance has it.
+    fn pull_in(&mut self, upwards: bool) {
+        let turns = (self.rotor - self.field as f64) * self.model.per_period;
         let lag = wrapped(turns);
         let mut place = turns - lag;
         if 0.5 - lag.abs() < BALANCE_PERIODS {
@@ -329,11 +341,10 @@ impl MotorState {
             let sign = if upwards { 1.0 } else { -1.0 };
             let middle = place + 0.5_f64.copysign(lag);
             place = middle + 0.5 * sign;
-            self.rotor = (middle + BALANCE_PERIODS * sign) * self.model.period;
+            self.rotor = self.field as f64 + (middle + BALANCE_PERIODS * sign) * self.model.period;
         }
-        self.field = libm::rint(place * self.model.period) as i64;
-        (self.chunk_field, self.weight, self.rate) = (self.field, 0, 0.0);
-        self.settled = false;
+        self.field += libm::rint(place * self.model.period) as i64;
+        self.chunk_field = self.field;
     }
 
     /// Integrates all chunks of time that end at or before `now`. Calling it more often changes nothing.
@@ -462,6 +473,10 @@ impl MotorState {
 
     /// Microsteps by which the rotor has slipped against the field: whole electrical periods, 0 while in step.
     pub(crate) fn lost(&self) -> i64 {
+        if self.begins_anew.is_some() {
+            // What it counts from shows only with its first current.
+            return 0;
+        }
         let periods = (self.chunk_field as f64 - self.rotor) * self.model.per_period;
         (libm::floor(periods + 0.5) * self.model.period) as i64
     }

@@ -16,8 +16,11 @@ use crate::{
     journal::{Height, MovedBy},
 };
 
-/// The most places that are told; more say nothing.
+/// The most places that are told, from the middle of those that there are: where there are more, Z has to be measured, and
+/// any of them tells where the others are.
 pub const STANDINGS_MAX: usize = 8;
+/// An axis that may have been anywhere in more than this was nowhere, in mm.
+const RANGE_MAX_MM: f64 = 10_000.0;
 /// Full steps from one place of the rotor to the next that is alike.
 const FULL_STEPS_PER_PERIOD: f64 = 4.0;
 /// A rotor may be so many full steps from where its driver has it: it hangs behind by its load, and count and position
@@ -50,8 +53,7 @@ impl Standings {
         let unknown = Self { places: Vec::new(), pitch: Mm(pitch_mm), error: Mm(away * per_full * step_mm) };
         let known = height.filter(|height| height.since_power_up && height.by != MovedBy::Others);
         let Some((height, [low, high])) = known.zip(range_mm) else { return unknown };
-        let is_near = (0.0..=STANDINGS_MAX as f64 * pitch_mm).contains(&(high - low));
-        if !is_near {
+        if !(0.0..=RANGE_MAX_MM).contains(&(high - low)) {
             return unknown;
         }
         let full_steps = |mm: f64| f64::from(height.count) / per_full + (mm - height.z) / step_mm / per_full;
@@ -66,6 +68,7 @@ impl Standings {
             height.z + (place * FULL_STEPS_PER_PERIOD * per_full - f64::from(height.count)) * step_mm
         };
         let count = ((last - first) as usize).min(STANDINGS_MAX - 1) + 1;
+        let first = first.max((middle - 0.5 * count as f64).round()).min(last - (count - 1) as f64);
         let mut places: Vec<f64> = (0..count).map(|at| first + at as f64).collect();
         places.sort_by(|a, b| (a - middle).abs().total_cmp(&(b - middle).abs()));
         Self {

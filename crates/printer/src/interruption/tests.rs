@@ -172,7 +172,6 @@ fn doubt_is_not_hidden() {
         at(false, MovedBy::File, Some([1.0, 1.0])),
         at(true, MovedBy::Others, Some([1.0, 1.0])),
         at(true, MovedBy::File, None),
-        at(true, MovedBy::File, Some([1.0, 50.0])),
         at(true, MovedBy::File, Some([1.0, f64::NAN])),
         Standings::new(&motor(), None, Some([1.0, 1.0])),
     ] {
@@ -182,5 +181,12 @@ fn doubt_is_not_hidden() {
     // Over a hop there are several places, at most the bound.
     let hop = at(true, MovedBy::File, Some([1.0, 1.4]));
     assert!((3..=5).contains(&hop.places.len()), "{hop:?}");
-    assert!(at(true, MovedBy::File, Some([1.0, 2.2])).places.len() <= STANDINGS_MAX);
+    // Where there are too many, those from the middle are told.
+    let far = at(true, MovedBy::File, Some([1.0, 51.0]));
+    assert_eq!(far.places.len(), STANDINGS_MAX);
+    assert!(far.places.iter().all(|place| (place.0 - 26.0).abs() < 0.16 * 4.5), "{far:?}");
+    let on_grid = |place: &Mm| {
+        (((place.0 - hop.places[0].0) / 0.16).round() * 0.16 + hop.places[0].0 - place.0).abs() < 1e-9
+    };
+    assert!(far.places.iter().all(on_grid));
 }

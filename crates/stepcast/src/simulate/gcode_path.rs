@@ -54,9 +54,13 @@ pub(crate) struct GcodePath<R> {
     interpreter: Interpreter,
     actions: Vec<Action>,
     next_action: usize,
+    /// The line that they are of.
+    line: u32,
     /// The arc that is being flattened.
     chords: Option<(Chords, Arc)>,
     homed: VecDeque<(usize, f64)>,
+    /// Lines before this one are read, not made; where axes are once they are homed there.
+    begins: (u32, [f64; AXES]),
     fed_all: bool,
     ended: bool,
 }
@@ -70,11 +74,18 @@ impl<R: MoreGcode> GcodePath<R> {
             interpreter: Interpreter::new(settings),
             actions: Vec::new(),
             next_action: 0,
+            line: 0,
             chords: None,
             homed: VecDeque::new(),
+            begins: (0, [0.0; AXES]),
             fed_all: false,
             ended: false,
         }
+    }
+
+    /// The print begins with this line; those before are read as if axes had been homed to these positions.
+    pub(crate) fn begin_with(&mut self, line: u32, endstops: [f64; AXES]) {
+        self.begins = (line, endstops);
     }
 
     /// The printer found this axis' endstop and says that it is here.
@@ -129,7 +140,12 @@ impl<R: MoreGcode> GcodePath<R> {
             }
             if let Some(action) = self.actions.get_mut(self.next_action) {
                 self.next_action += 1;
-                match std::mem::replace(action, Action::WaitForMoves) {
+                let action = std::mem::replace(action, Action::WaitForMoves);
+                if self.line < self.begins.0 {
+                    self.pass(&action);
+                    continue;
+                }
+                match action {
                     Action::Move(mv) => return Ok(Some(Piece::new(&mv, 0.0))),
                     Action::Arc(arc) => self.chords = Some((arc.chords(CHORD_TOLERANCE), arc)),
                     Action::Home { x, y, z } => self.home([x, y, z])?,
@@ -144,12 +160,21 @@ impl<R: MoreGcode> GcodePath<R> {
         }
     }
 
+    /// An action of a line that is not made.
+    fn pass(&mut self, action: &Action) {
+        if let Action::Home { x, y, z } = *action {
+            let at = |axis: usize, is: bool| is.then_some(self.begins.1[axis]);
+            self.interpreter.set_axes(at(0, x), at(1, y), at(2, z));
+        }
+    }
+
     /// Reads the next line into `actions`; `false` at the end.
     fn read_line(&mut self) -> anyhow::Result<bool> {
         self.actions.clear();
         self.next_action = 0;
         loop {
             if let Some(line) = self.lines.next() {
+                self.line = line.number.0;
                 // What is wrong with the file has been said by the check before.
                 self.interpreter.line(line.number, line.bytes, &mut self.actions, &mut Vec::new());
                 return Ok(true);

@@ -14,12 +14,15 @@ mod run;
 mod tally;
 mod temperature;
 
-use std::{collections::BTreeSet, process::ExitCode};
+use std::{collections::BTreeSet, path::Path, process::ExitCode};
 
+use anyhow::Context;
 use gcode::Severity;
 use printer::{
     check::CheckReport,
+    config::PrinterConfig,
     error::{ErrorCode, PrinterError},
+    preview::Preview,
     session::JobOptions,
 };
 use units::Seconds;
@@ -46,11 +49,15 @@ const JOURNAL: u32 = 1;
 pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
     let config = config_file::load(&args.config)?;
     let found = check::check(&args.file, Some(&config))?;
+    let start_line = match args.start_layer {
+        Some(layer) => Some(first_line(&args.file, &config, layer)?),
+        None => args.start_line,
+    };
     let options = JobOptions {
         confirmed_lines: args.confirm_lines.iter().copied().collect::<BTreeSet<u32>>(),
         confirm_all: args.confirm_all,
         journal: Some(JOURNAL),
-        start_line: None,
+        start_line: start_line.filter(|&line| line > 1),
     };
     let setup = Setup {
         config,
@@ -93,6 +100,28 @@ fn finish(args: &SimulateArgs, report: &Report) -> anyhow::Result<ExitCode> {
         console::show_error(error);
     }
     Ok(if report.result == Outcome::Done { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// The line with which a layer begins.
+fn first_line(file: &Path, config: &PrinterConfig, layer: u32) -> anyhow::Result<u32> {
+    let mut input = Input::open(file)?;
+    let mut preview = Preview::new(Some(config));
+    let mut vertices = Vec::new();
+    loop {
+        let piece = input.next(preview.wants())?;
+        if piece.is_empty() {
+            break;
+        }
+        preview.feed(piece);
+        while preview.run(&mut vertices) {
+            vertices.clear();
+        }
+        vertices.clear();
+        preview.take_marks();
+    }
+    let layers = preview.finish().layers;
+    let found = layers.get(layer as usize - 1).map(|layer| layer.first_line);
+    found.with_context(|| format!("the file has {} layers, no layer {layer}", layers.len()))
 }
 
 /// Why a file is not printed.

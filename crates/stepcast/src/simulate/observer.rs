@@ -78,6 +78,8 @@ pub(super) struct Observer {
     pub(super) is_taken_up: bool,
     /// The end of the last move that was told.
     told_until: Ticks,
+    /// The print does not begin with its file, and has not begun.
+    begins_within: bool,
     /// When anything happened last.
     pub(super) last_change: Ticks,
     messages: u32,
@@ -109,10 +111,17 @@ impl Observer {
             began: None,
             is_taken_up: false,
             told_until: Ticks(0),
+            begins_within: false,
             last_change: start,
             messages: 0,
             quiet,
         }
+    }
+
+    /// The print begins with this line.
+    pub(super) fn begin_with(&mut self, line: u32) {
+        self.gcode.begin_with(line, self.endstop_mm);
+        self.begins_within = true;
     }
 
     /// Takes in what happened.
@@ -193,6 +202,10 @@ impl Observer {
             tally.digest.expect_run(at, homing);
             self.run_start = (!homing).then_some(at);
             self.began = self.began.or(self.run_start);
+            if line > 0 && core::mem::take(&mut self.begins_within) {
+                // What was done on the way there has nothing to do with the file's filament.
+                tally.path.set_position(EXTRUDER, from[EXTRUDER]);
+            }
         }
         self.plan_steps(scheduled);
         let mut piece = Piece { line, from, to, bulge_mm: 0.0 };

@@ -155,6 +155,8 @@ pub(crate) struct Simulation {
     consent_at: Option<Ticks>,
     /// … and until then nothing moves: the last step when the hold was shown.
     held_at: Option<Ticks>,
+    /// Z is being homed, and then the print begins.
+    homes: bool,
     host_dies: Option<Ticks>,
     successor: Option<Successor>,
     config: PrinterConfig,
@@ -209,8 +211,12 @@ impl Simulation {
             ("heater_bed", config.heater_bed.as_ref().map(|bed| bed.standby_temp)),
         ]
         .map(|(name, standby)| (name, standby.unwrap_or(Celsius(0.0))));
+        let mut observer = Observer::new(&config, reference, start, quiet);
+        if let Some(line) = options.start_line {
+            observer.begin_with(line);
+        }
         Ok(Self {
-            observer: Observer::new(&config, reference, start, quiet),
+            observer,
             session: Session::new(config.clone(), clock.at(printer.now())),
             clock,
             job,
@@ -219,6 +225,7 @@ impl Simulation {
             consent_after,
             consent_at: None,
             held_at: None,
+            homes: false,
             host_dies: host_dies.map(|at| start + host_hz.ticks_in(at)),
             successor,
             config,
@@ -293,7 +300,7 @@ impl Simulation {
                 self.printer.write(to_board);
                 to_board.clear();
             }
-            let acted = self.take_events(now) | self.consent(now);
+            let acted = self.take_events(now) | self.consent(now) | self.set_out(now);
             let fed = self.feed()?;
             if !acted && !fed {
                 let queued = self.session.motion_queued(now);
@@ -326,6 +333,11 @@ impl Simulation {
                     }
                     None => Err(self.observer.held.clone().unwrap_or(ErrorCode::HeldHostAway.into())),
                 },
+                Wish::Resume if self.session.pending_start().is_some() => {
+                    // There is nothing on the bed: the user has Z homed first, and X and Y are homed on the way.
+                    self.homes = true;
+                    self.session.request(Request::Gcode("G28 Z".to_owned()), now)
+                }
                 Wish::Resume => self.session.request(Request::Resume, now),
                 Wish::End => {
                     self.end();
@@ -383,6 +395,17 @@ impl Simulation {
             self.end();
         }
         true
+    }
+
+    /// The user says yes to a print that begins in the middle of its file, once Z is homed.
+    fn set_out(&mut self, now: Seconds) -> bool {
+        let is_homed = self.session.position().is_some_and(|(_, homed)| homed[2]);
+        if !self.homes || !is_homed {
+            return false;
+        }
+        // It is refused until the axis is at rest.
+        self.homes = self.session.request(Request::Resume, now).is_err();
+        !self.homes
     }
 
     fn end(&mut self) {

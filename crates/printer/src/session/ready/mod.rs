@@ -76,6 +76,8 @@ pub(super) struct Ready {
     pub(super) events: Events,
     pub(super) diary: Diary,
     pub(super) last_active: Seconds,
+    /// When the last run of motion came to its end, by this host's clock.
+    rested: Seconds,
     lease: Lease,
     /// Motion is held.
     hold: Option<Hold>,
@@ -110,6 +112,7 @@ impl Ready {
             events: Events::default(),
             diary: Diary::default(),
             last_active: now,
+            rested: Seconds(f64::NEG_INFINITY),
             lease,
             hold: None,
             have_heaters_fallen: false,
@@ -280,6 +283,7 @@ impl Ready {
             self.on_due(due, now);
         }
         if let Some(run) = self.stream.take_finished(motion_now, &self.board) {
+            self.rested = now;
             self.lease.end(run, &mut self.board);
         }
         if core::mem::take(&mut self.have_heaters_fallen) {

@@ -129,6 +129,10 @@ impl Ready {
             Planned::Barrier { line, barrier } => return self.on_barrier(line, &barrier, now),
             Planned::Notice(diagnostic) => self.on_notice(diagnostic, now),
             Planned::NeedsInput => return Ok(self.on_drained(now)),
+            Planned::EndOfSource if self.board.said_after < self.rested => {
+                self.wait = Wait::Word;
+                return Ok(false);
+            }
             Planned::EndOfSource => self.finish_job(now),
         }
         Ok(true)

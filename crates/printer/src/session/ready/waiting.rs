@@ -21,6 +21,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) enum Wait {
     Nothing,
+    /// For a word of the board's that it has lived to make everything: by this host's clock it has.
+    Word,
     /// Until a nozzle that may stick to the part comes free.
     Free,
     /// For all heaters, before a paused job goes back to where it was.
@@ -67,7 +69,9 @@ impl Wait {
         let held = match *self {
             Self::Heater { heater, until } => HeldWait::Heater { heater, until },
             Self::Dwell { until } => HeldWait::Dwell { rest: until - now },
-            Self::Nothing | Self::Free | Self::Heat | Self::Homing { .. } => return HeldWait::Nothing,
+            Self::Nothing | Self::Word | Self::Free | Self::Heat | Self::Homing { .. } => {
+                return HeldWait::Nothing;
+            }
         };
         *self = Self::Nothing;
         held
@@ -98,6 +102,11 @@ impl Ready {
     pub(super) fn advance_wait(&mut self, now: Seconds) {
         match &mut self.wait {
             Wait::Nothing => {}
+            Wait::Word => {
+                if self.board.said_after >= self.rested {
+                    self.wait = Wait::Nothing;
+                }
+            }
             Wait::Free => {
                 if self.thermal.is_heated() || self.extrusion_permit() == ExtrusionPermit::Allowed {
                     self.wait = Wait::Nothing;

@@ -11,7 +11,7 @@ mod tests;
 mod trace;
 
 use printer::config::PrinterConfig;
-use units::{Mm, Seconds};
+use units::{Mm, MmPerS, Seconds};
 use virtual_printer::BoardProfile;
 
 use self::{
@@ -31,6 +31,8 @@ const SAG_PART: f64 = 0.25;
 const SAG_MM: f64 = 0.5;
 /// Whoever measures Z is off by up to so much, in mm: a sheet of paper.
 const MEASURED_MM: f64 = 0.05;
+/// X and Y are as exact as they are homed: no faster than so, in mm/s.
+const SECOND_HOMING: MmPerS = MmPerS(5.0);
 /// In so many prints the host has the same power.
 const HOST_DIES_PART: f64 = 0.5;
 
@@ -90,12 +92,16 @@ pub(super) fn run(
     seed: u64,
     chance: &mut Chance,
 ) -> anyhow::Result<Judged> {
+    let mut config = config.clone();
+    for stepper in &mut config.steppers {
+        stepper.second_homing_speed = stepper.second_homing_speed.min(SECOND_HOMING);
+    }
     let mut clean = Rig::new(config.clone(), board, window.gcode.clone(), None, seed)?;
     let began = clean.print()?;
     let loss = Loss::new(began, clean.age(), chance);
     let clean = Laid::of(&clean.way());
     let about = loss.text();
-    let finding = interrupted(config, window, board, seed, &loss, &clean)
+    let finding = interrupted(&config, window, board, seed, &loss, &clean)
         .unwrap_or_else(|error| Finding { broken: vec![format!("{error:#}")], ..Finding::default() });
     Ok(Judged { finding, about })
 }
@@ -135,9 +141,10 @@ fn interrupted(
             broken.push(format!("something is missing: {missing:?}"));
         }
     }
-    let lost_steps = rig.lost_steps();
-    if lost_steps > 0 {
-        broken.push(format!("{lost_steps} steps were lost"));
+    let mut lost_steps = 0;
+    for (motor, lost) in rig.lost_steps().into_iter().filter(|(_, lost)| *lost > 0) {
+        lost_steps += lost;
+        broken.push(format!("{motor} lost {lost} steps"));
     }
     if !rig.is_cold() {
         broken.push("a heater is still on".to_owned());

@@ -18,6 +18,10 @@ const CELL_MM: f64 = 0.1;
 /// A place is looked for among those of its line that are so many behind or before the last found.
 const NEAR_PLACES: usize = 400;
 
+/// A line with no more places than these is looked for among the lines around it, where it is not found itself.
+const SHORT_PLACES: usize = 2;
+const NEAR_LINES: u32 = 4;
+
 /// How one print lies to another.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Off {
@@ -31,26 +35,42 @@ pub(super) struct Off {
     pub(super) strays: u64,
 }
 
+/// A line's share of a way.
+#[derive(Clone, Debug, Default)]
+struct Line {
+    places: Vec<[f64; 3]>,
+    /// The same with the places right before and behind, between which it ends.
+    way: Vec<[f64; 3]>,
+}
+
 /// What was laid, line by line.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Laid(BTreeMap<u32, Vec<[f64; 3]>>);
+pub(super) struct Laid(BTreeMap<u32, Line>);
 
 impl Laid {
     /// Of a way.
     pub(super) fn of(way: &[(Sample, Doing)]) -> Self {
-        let mut lines: BTreeMap<u32, Vec<[f64; 3]>> = BTreeMap::new();
-        for (sample, doing) in way {
-            if let Doing::Line { line, extrudes: true } = doing {
-                lines.entry(*line).or_default().push(sample.place);
-            }
+        let mut lines: BTreeMap<u32, Line> = BTreeMap::new();
+        for (at, (sample, doing)) in way.iter().enumerate() {
+            let Doing::Line { line, extrudes: true } = doing else { continue };
+            let is_same = |other: usize| way.get(other).is_some_and(|(_, other)| other == doing);
+            let laid = lines.entry(*line).or_default();
+            let [before, behind] =
+                [at.wrapping_sub(1), at + 1].map(|end| (!is_same(end)).then(|| way.get(end)).flatten());
+            laid.way.extend(before.map(|(sample, _)| sample.place));
+            laid.way.push(sample.place);
+            laid.way.extend(behind.map(|(sample, _)| sample.place));
+            laid.places.push(sample.place);
         }
         Self(lines)
     }
 
     /// Both together.
     pub(super) fn and(mut self, other: &Self) -> Self {
-        for (line, places) in &other.0 {
-            self.0.entry(*line).or_default().extend(places);
+        for (line, laid) in &other.0 {
+            let mine = self.0.entry(*line).or_default();
+            mine.places.extend(&laid.places);
+            mine.way.extend(&laid.way);
         }
         self
     }
@@ -64,12 +84,21 @@ impl Laid {
     /// How far all of it is from the same lines of another.
     pub(super) fn off(&self, other: &Self) -> Off {
         let mut off = Off::default();
-        for (line, places) in &self.0 {
-            let Some(others) = other.0.get(line) else {
+        for (line, Line { places, .. }) in &self.0 {
+            // A line that is shorter than what is noted of the way may have no place of its own.
+            let around = || other.0.range(line.saturating_sub(NEAR_LINES)..=line.saturating_add(NEAR_LINES));
+            let others = match other.0.get(line) {
+                Some(others) => &others.way,
+                None if places.len() <= SHORT_PLACES => {
+                    &around().flat_map(|(_, line)| line.way.iter().copied()).collect()
+                }
+                None => &Vec::new(),
+            };
+            if others.is_empty() {
                 off.strays += places.len() as u64;
                 off.line = *line;
                 continue;
-            };
+            }
             let mut last = 0;
             for place in places {
                 let (at, [xy, z]) = nearest(*place, others, last);

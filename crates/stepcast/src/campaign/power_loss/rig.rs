@@ -235,6 +235,9 @@ impl Rig {
 
     /// The power is back after a while, and the user has another host go on with the print.
     pub(super) fn go_on(&mut self, loss: &Loss) -> anyhow::Result<Option<GoneOn>> {
+        if self.is_done {
+            return Ok(None);
+        }
         let mut broken = Vec::new();
         let pulses = self.printer.recorder().pulses;
         let back = loss.at + loss.lasts;
@@ -252,8 +255,8 @@ impl Rig {
         }
         let found = self.survey()?;
         let lines = self.gcode.split(|&byte| byte == b'\n').filter(|line| !line.is_empty()).count();
-        if found.start_line as usize > lines {
-            // There is nothing left of it.
+        if found.start_line as usize > lines || found.start_line <= 1 {
+            // There is nothing left of it, or nothing has been made.
             return Ok(None);
         }
         self.start(2, Some(found.start_line))?;
@@ -330,9 +333,10 @@ impl Rig {
         self.printer.state().motors[Z].position.0 - claimed
     }
 
-    /// Steps that the motors have lost since the power came back.
-    pub(super) fn lost_steps(&mut self) -> u64 {
-        self.printer.state().motors.iter().map(|motor| motor.lost.0.unsigned_abs()).sum()
+    /// Steps that each motor has lost since the power came back.
+    pub(super) fn lost_steps(&mut self) -> Vec<(String, u64)> {
+        let state = self.printer.state();
+        state.motors.into_iter().map(|motor| (motor.name, motor.lost.0.unsigned_abs())).collect()
     }
 
     /// Whether all heaters are off.
