@@ -69,6 +69,15 @@ pub struct RowPlace {
     pub left: u16,
 }
 
+impl RowPlace {
+    /// The place of a motor whose rows the board counts from here.
+    pub(crate) const fn after(self, queue: &MotorQueue) -> Self {
+        // The first row that is counted may be the rest of one: then that has not been made whole before.
+        let left = if queue.done == 0 && queue.left == 0 { self.left } else { queue.left };
+        Self { done: self.done.saturating_add(queue.done), left }
+    }
+}
+
 /// A heater in a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

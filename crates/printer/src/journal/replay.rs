@@ -255,13 +255,7 @@ impl Replay {
         for &input in &adopted {
             apply_factor(&mut source, input);
         }
-        let from = core::array::from_fn(|motor| {
-            let (base, queue) = (self.wanted.from[motor], self.queue.motors[motor]);
-            let done = base.done.saturating_add(queue.done);
-            // The first row that is counted may be the rest of one: then that has not been made whole before.
-            let left = if queue.done == 0 && queue.left == 0 { base.left } else { queue.left };
-            RowPlace { done, left }
-        });
+        let from = core::array::from_fn(|motor| self.wanted.from[motor].after(&self.queue.motors[motor]));
         let forward = self.motors.each_ref().map(|motor| motor.forward);
         let made = self.motors.each_ref().map(|motor| motor.made);
         Continuation {

@@ -111,7 +111,7 @@ impl Diary {
         self.input(Input::Target(name, celsius));
     }
 
-    /// A run of the job's motion begins at a motion clock: the board counts its rows.
+    /// A run of the job's motion begins at a motion clock: the board counts its rows, whether or not they are journaled.
     pub(super) fn run(&mut self, start: Ticks, board: &mut Board) {
         if let Some(job) = &mut self.job {
             job.runs += 1;
@@ -121,7 +121,10 @@ impl Diary {
 
     /// The board counts the rows of the present run anew, from there.
     pub(super) fn count(&mut self, start: Ticks, from: [RowPlace; MOTORS], board: &mut Board) {
-        let Some(job) = self.job.as_mut().filter(|_| board.layout.has_motion_clock) else { return };
+        if !board.layout.has_motion_clock {
+            return;
+        }
+        let Some(job) = &mut self.job else { return board.control(&Command::MotionJob { id: NO_JOB }) };
         job.id = job.id.wrapping_add(1).max(NO_JOB + 1);
         board.control(&Command::MotionJob { id: job.id });
         self.writer.write(&Record::Run { id: job.id, run: job.runs, start: start.low().0, from });

@@ -42,6 +42,7 @@ impl Session {
             }
             Request::SetFan(speed) => {
                 ready.thermal.set_fan(speed, None, &mut ready.board, now);
+                ready.stream.kept.set_fan(speed);
                 ready.diary.input(Input::Fan(speed));
             }
             Request::SetSpeedFactor(factor) => {

@@ -26,6 +26,9 @@ impl Ready {
             self.skip(now);
             return Ok(());
         }
+        if self.plans_nothing() {
+            return Ok(());
+        }
         self.planner.guard.extrusion = self.extrusion_permit();
         for _ in 0..PLAN_ITEMS_MAX {
             let clock_now = self.board.motion_at(now);
@@ -43,7 +46,11 @@ impl Ready {
             let stopping = self.job.as_ref().is_some_and(|job| {
                 matches!(
                     job.state,
-                    JobState::Pausing | JobState::Returning | JobState::Cancelling | JobState::Failing(_)
+                    JobState::Pausing
+                        | JobState::Parking
+                        | JobState::Returning
+                        | JobState::Cancelling
+                        | JobState::Failing(_)
                 )
             });
             if stopping && !homing {
@@ -179,7 +186,10 @@ impl Ready {
         let clock = run.start + self.board.ticks(at);
         match action {
             // The board itself does it at that clock.
-            TimedAction::Fan { speed, .. } => self.thermal.set_fan(speed, Some(clock), &mut self.board, now),
+            TimedAction::Fan { speed, .. } => {
+                self.stream.kept.push_fan(clock, speed);
+                self.thermal.set_fan(speed, Some(clock), &mut self.board, now);
+            }
             action => self.stream.schedule(clock, Due::Action(line, action)),
         }
     }

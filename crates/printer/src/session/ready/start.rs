@@ -31,6 +31,8 @@ impl Ready {
             could_extrude: false,
             targets: Vec::new(),
             start: Some(Start { clear_z: 0.0, fan: 0.0 }),
+            cut: None,
+            retracted: None,
         });
         Ok(())
     }

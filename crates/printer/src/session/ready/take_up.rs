@@ -126,9 +126,11 @@ impl Ready {
     pub(super) fn rejoin(&mut self, rest: &Rest, now: Seconds) {
         let Some(run) = self.stream.run() else { return };
         self.diary.count(run.start, rest.from, &mut self.board);
-        self.stream.give_again(&rest.backlog, rest.forward, &mut self.board, now);
+        self.stream.give_again(&rest.backlog, rest.forward, rest.from, &mut self.board, now);
+        self.stream.kept.set_fan(rest.fan);
         self.thermal.set_fan(rest.fan, None, &mut self.board, now);
         for &(at, speed) in &rest.fans {
+            self.stream.kept.push_fan(at, speed);
             self.thermal.set_fan(speed, Some(at), &mut self.board, now);
         }
     }
