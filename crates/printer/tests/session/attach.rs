@@ -23,7 +23,7 @@ pub(crate) fn setup(board: BoardProfile) -> Setup {
 }
 
 /// Several runs of motion with turns, fan changes and filament.
-fn file() -> String {
+pub(crate) fn file() -> String {
     let mut file = String::from("G28\nM83\nG92 E0\nG1 X20 Y20 Z1 F6000\nG1 X140 E2 F3000\n");
     for layer in 0..3 {
         let _ = write!(file, "M106 S{}\nG1 Z{:.1} F600\n", 80 * (layer + 1), 1.2 + 0.2 * f64::from(layer));
@@ -69,7 +69,7 @@ fn clean(setup: &Setup, file: &str) -> (Vec<Vec<bool>>, Vec<Pulse>) {
 }
 
 /// The host is gone for good, and after a while another one connects.
-fn die(bench: &mut Bench, setup: &Setup, seconds: f64) {
+pub(crate) fn die(bench: &mut Bench, setup: &Setup, seconds: f64) {
     bench.stalled = true;
     bench.run(seconds);
     bench.stalled = false;
@@ -78,7 +78,7 @@ fn die(bench: &mut Bench, setup: &Setup, seconds: f64) {
 
 /// The new host finds the print and takes it up, which moves nothing.
 #[track_caller]
-fn take_up(bench: &mut Bench, file: &str) {
+pub(crate) fn take_up(bench: &mut Bench, file: &str) {
     bench.until("the held print", 20.0, |bench| bench.session.phase() == PhaseName::Holding);
     let pulses = bench.pulses().len();
     let journal = Journal::read(bench.journal.as_bytes()).unwrap();
