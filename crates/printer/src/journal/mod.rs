@@ -78,6 +78,23 @@ impl RowPlace {
     }
 }
 
+/// Where a motor stood in its rows when the board dropped them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Dropped {
+    /// Rows that it had received …
+    pub received: u32,
+    /// … and made.
+    pub done: u32,
+    /// Steps of the next that it had not made.
+    pub left: u16,
+    /// The level of its direction pin for them.
+    pub dir: bool,
+    /// Steps counted since power-up.
+    pub position: i32,
+    /// The check over its rows.
+    pub crc: u32,
+}
+
 /// A heater in a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -96,6 +113,21 @@ impl HeaterName {
             Self::Bed => gcode::Heater::Bed,
         }
     }
+}
+
+/// A print that was put aside in the middle of a run of motion, or just behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Parked {
+    /// The board's number while the head is anywhere else.
+    pub id: u32,
+    /// The number under which it counted before.
+    pub of: u32,
+    /// Motion had been brought to rest; else the run had come to its end.
+    pub is_cut: bool,
+    /// Where each motor stood.
+    pub motors: [Dropped; MOTORS],
+    /// The filament that is pulled back, in mm.
+    pub retract: f64,
 }
 
 /// A line of a journal.
@@ -141,6 +173,8 @@ pub enum Record {
         /// Where each motor's count begins.
         from: [RowPlace; MOTORS],
     },
+    /// The print was put aside, and the head leaves the part: meanwhile the board counts under this number.
+    Parked(Parked),
     /// A host that began anew took up the plan: of the inputs so far only so many had come into force.
     Continued {
         /// See the record.
@@ -221,6 +255,9 @@ pub struct Journal {
     pub start_line: Option<u32>,
     inputs: Vec<(Place, Input)>,
     runs: Vec<CountedRun>,
+    parked: Vec<Parked>,
+    /// The last of the board's numbers.
+    last_id: u32,
     /// The line of the last move that was seen to be made, and the print time then.
     pub progress: Option<(u32, Seconds)>,
     /// Whether the print is over.
@@ -287,6 +324,8 @@ impl Journal {
             start_line,
             inputs: Vec::new(),
             runs: Vec::new(),
+            parked: Vec::new(),
+            last_id: print,
             progress: None,
             has_ended: false,
             bytes: 0,
@@ -297,7 +336,14 @@ impl Journal {
         match *record {
             Record::Input { at, input } => self.inputs.push((at, input)),
             Record::Continued { inputs } => self.inputs.truncate(inputs),
-            Record::Run { id, run, start, from } => self.runs.push(CountedRun { id, run, start, from }),
+            Record::Run { id, run, start, from } => {
+                self.last_id = id;
+                self.runs.push(CountedRun { id, run, start, from });
+            }
+            Record::Parked(parked) => {
+                self.last_id = parked.id;
+                self.parked.push(parked);
+            }
             Record::Progress { line, elapsed } => self.progress = Some((line, Seconds(elapsed))),
             // A second begin belongs to another print, which has no place in this journal.
             Record::Began { .. } | Record::Ended => self.has_ended = true,
@@ -306,7 +352,19 @@ impl Journal {
 
     /// Whether a board that counts under this number carries out this print.
     pub fn knows(&self, id: u32) -> bool {
-        self.runs.iter().any(|run| run.id == id)
+        self.runs.iter().any(|run| run.id == id) || self.parked.iter().any(|parked| parked.id == id)
+    }
+
+    /// What a board would say of the print had it not been put aside, and how it was, if it was.
+    fn unparked(&self, queue: BoardQueue) -> (BoardQueue, Option<Parked>) {
+        let Some(&parked) = self.parked.iter().rfind(|parked| parked.id == queue.id) else {
+            return (queue, None);
+        };
+        let motors = parked.motors.map(|motor| {
+            let Dropped { received, done, left, dir, position, crc } = motor;
+            MotorQueue { received, done, left, dir, position, crc, ..MotorQueue::default() }
+        });
+        (BoardQueue { id: parked.of, is_held: parked.is_cut, motors }, Some(parked))
     }
 }
 
@@ -351,6 +409,7 @@ mod tests {
     fn what_was_written_is_read_to_the_last_bit() {
         let at = Place { items: 12, drained: Some(345) };
         let from = [RowPlace { done: 1, left: 2 }; MOTORS];
+        let dropped = Dropped { received: 7, done: 5, left: 3, dir: true, position: -77, crc: u32::MAX };
         let records = [
             began(),
             Record::Input { at, input: Input::Speed(0.1 + 0.7) },
@@ -358,6 +417,13 @@ mod tests {
             Record::Run { id: 8, run: 1, start: u32::MAX, from },
             Record::Continued { inputs: 1 },
             Record::Input { at, input: Input::Target(HeaterName::Bed, 60.5) },
+            Record::Parked(Parked {
+                id: 9,
+                of: 8,
+                is_cut: true,
+                motors: [dropped; MOTORS],
+                retract: 0.1 + 0.2,
+            }),
             Record::Progress { line: 77, elapsed: 1.5 },
         ];
         let text = written(&records);
@@ -370,7 +436,12 @@ mod tests {
             journal.inputs,
             [(at, Input::Speed(0.1 + 0.7)), (at, Input::Target(HeaterName::Bed, 60.5))]
         );
-        assert!(journal.knows(8) && !journal.knows(7) && !journal.has_ended);
+        assert!(journal.knows(8) && journal.knows(9) && !journal.knows(7) && !journal.has_ended);
+        let board = BoardQueue { id: 9, ..BoardQueue::default() };
+        let (queue, parked) = journal.unparked(board);
+        assert_eq!((queue.id, queue.is_held, queue.motors[2].left), (8, true, 3));
+        assert_eq!((parked.unwrap().retract.to_bits(), journal.last_id), ((0.1_f64 + 0.2).to_bits(), 9));
+        assert_eq!(journal.unparked(queue), (queue, None));
         assert_eq!((journal.progress, journal.bytes), (Some((77, Seconds(1.5))), text.len()));
         assert!(Journal::read((text + &written(&[Record::Ended])).as_bytes()).unwrap().has_ended);
     }

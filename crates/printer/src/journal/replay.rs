@@ -15,7 +15,7 @@ use units::{Celsius, Clock32, Seconds, Ticks};
 use wire::RowCheck;
 
 use super::{
-    CountedRun, Input, Journal, Place, RowPlace, machine_check,
+    CountedRun, Input, Journal, Parked, Place, RowPlace, machine_check,
     rows::{BoardQueue, Row},
 };
 use crate::{
@@ -85,6 +85,8 @@ pub(crate) struct Continuation {
     pub(crate) elapsed: Seconds,
     /// The number under which the board last counted.
     pub(crate) id: u32,
+    /// How it was put aside, where it was.
+    pub(crate) parked: Option<Parked>,
 }
 
 /// How far a replay is.
@@ -121,6 +123,7 @@ pub(crate) struct Replay {
     elapsed: Seconds,
     /// The last number in the journal.
     last_id: u32,
+    parked: Option<Parked>,
     /// Reads up to the line with which the print begins.
     skip: Option<Skip>,
     is_done: bool,
@@ -144,6 +147,7 @@ impl Replay {
         if journal.machine != machine_check(config) || journal.clock != clock {
             return Err(differs("the machine file or the board is not the one it was begun with"));
         }
+        let (queue, parked) = journal.unparked(queue);
         let wanted = journal.runs.iter().rfind(|run| run.id == queue.id);
         let wanted = *wanted.ok_or_else(|| differs("the board carries out something else"))?;
         let mut planner = Planner::new(config, clock)?;
@@ -177,7 +181,8 @@ impl Replay {
             targets: Vec::new(),
             fan: 0.0,
             elapsed: Seconds::ZERO,
-            last_id: journal.runs.last().map_or(0, |run| run.id),
+            last_id: journal.last_id,
+            parked,
             skip: journal.start_line.map(|line| Skip::new(line, endstops)),
             is_done: false,
         })
@@ -278,6 +283,7 @@ impl Replay {
             fan: self.fan,
             elapsed: self.elapsed,
             id: self.last_id,
+            parked: self.parked,
         }
     }
 

@@ -10,8 +10,8 @@ use super::{board::Board, job::JobOptions};
 use crate::{
     config::PrinterConfig,
     journal::{
-        Continuation, FORMAT, HeaterName, Input, PROGRESS_INTERVAL, Place, Record, RowPlace, Writer,
-        machine_check,
+        Continuation, Dropped, FORMAT, HeaterName, Input, MotorQueue, PROGRESS_INTERVAL, Parked, Place,
+        Record, RowPlace, Writer, machine_check,
     },
     machine::MOTORS,
     planner::{Planned, Planner},
@@ -35,6 +35,16 @@ struct Job {
     /// The number under which the board counts.
     id: u32,
     told: Seconds,
+    /// It is put aside, and can be taken up from there.
+    is_parked: bool,
+}
+
+impl Job {
+    /// Another number for the board.
+    fn next_id(&mut self) -> u32 {
+        self.id = self.id.wrapping_add(1).max(NO_JOB + 1);
+        self.id
+    }
 }
 
 impl Diary {
@@ -63,7 +73,7 @@ impl Diary {
             confirm_all: options.confirm_all,
             start_line: options.start_line.filter(|&line| line > 1),
         });
-        self.job = Some(Job { place: Place::default(), runs: 0, id: print, told: now });
+        self.job = Some(Job { place: Place::default(), runs: 0, id: print, told: now, is_parked: false });
     }
 
     /// A job is taken up again.
@@ -73,12 +83,12 @@ impl Diary {
         for &input in &taken.adopted {
             self.writer.write(&Record::Input { at: place, input });
         }
-        self.job = Some(Job { place, runs, id, told: now });
+        self.job = Some(Job { place, runs, id, told: now, is_parked: taken.parked.is_some() });
     }
 
     /// The job is over, at rest: the board holds nothing any more that could be gone on with.
     pub(super) fn end(&mut self, board: &mut Board) {
-        self.other_run(board);
+        self.lose_place(board);
         if self.job.take().is_some() {
             self.writer.write(&Record::Ended);
         }
@@ -125,14 +135,44 @@ impl Diary {
             return;
         }
         let Some(job) = &mut self.job else { return board.control(&Command::MotionJob { id: NO_JOB }) };
-        job.id = job.id.wrapping_add(1).max(NO_JOB + 1);
-        board.control(&Command::MotionJob { id: job.id });
-        self.writer.write(&Record::Run { id: job.id, run: job.runs, start: start.low().0, from });
+        job.is_parked = false;
+        let id = job.next_id();
+        board.control(&Command::MotionJob { id });
+        self.writer.write(&Record::Run { id, run: job.runs, start: start.low().0, from });
     }
 
-    /// A run begins that is none of the job's: while it is made, the job cannot be taken up.
-    pub(super) fn other_run(&self, board: &mut Board) {
-        if self.job.is_some() && board.layout.has_motion_clock {
+    /// The job is put aside where its motors stand so; then the head is moved. It can be taken up as long as only the
+    /// planner moves it.
+    pub(super) fn park(
+        &mut self,
+        queues: &[MotorQueue; MOTORS],
+        is_cut: bool,
+        retract: f64,
+        board: &mut Board,
+    ) {
+        let Some(job) = &mut self.job else { return };
+        job.is_parked = true;
+        let of = job.id;
+        let id = job.next_id();
+        board.control(&Command::MotionJob { id });
+        let motors = queues.map(|queue| {
+            let MotorQueue { received, done, left, dir, position, crc, .. } = queue;
+            Dropped { received, done, left, dir, position, crc }
+        });
+        self.writer.write(&Record::Parked(Parked { id, of, is_cut, motors, retract }));
+    }
+
+    /// A run begins that is none of the job's. Unless the job was put aside, it cannot be taken up any more.
+    pub(super) fn other_run(&mut self, board: &mut Board) {
+        if !self.job.as_ref().is_some_and(|job| job.is_parked) {
+            self.lose_place(board);
+        }
+    }
+
+    /// Where the machine stands is told by other things than its motors' counts: the job cannot be taken up.
+    pub(super) fn lose_place(&mut self, board: &mut Board) {
+        if let Some(job) = self.job.as_mut().filter(|_| board.layout.has_motion_clock) {
+            job.is_parked = false;
             board.control(&Command::MotionJob { id: NO_JOB });
         }
     }

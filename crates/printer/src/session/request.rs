@@ -235,7 +235,7 @@ impl Ready {
             let detail = format!("an axis cannot stand at {position}");
             return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail));
         }
-        self.diary.other_run(&mut self.board);
+        self.diary.lose_place(&mut self.board);
         self.planner.set_axis(axis, position.0, true);
         self.planner.correct(&mut self.console.source);
         Ok(())

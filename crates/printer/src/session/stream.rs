@@ -73,18 +73,18 @@ pub(super) struct TakenUp {
 /// A run of motion that was put aside at rest on its path.
 #[derive(Debug)]
 pub(super) struct Cut {
-    run: Run,
+    pub(super) run: Run,
     /// The motion clock of that rest.
     pub(super) at: Ticks,
     pub(super) left: Left,
     /// Each motor's direction after the rows that are left.
-    forward: [bool; MOTORS],
+    pub(super) forward: [bool; MOTORS],
     /// Steps that the board has counted in the run.
-    made: [i32; MOTORS],
-    position_at_start: Position,
+    pub(super) made: [i32; MOTORS],
+    pub(super) position_at_start: Position,
     /// Print time of the runs before.
-    elapsed: Seconds,
-    timeline: VecDeque<(Ticks, Due)>,
+    pub(super) elapsed: Seconds,
+    pub(super) timeline: VecDeque<(Ticks, Due)>,
 }
 
 /// What has to be said to a motor before its next steps.
@@ -282,6 +282,14 @@ impl MotionStream {
         self.elapsed = taken.elapsed;
         self.enabled = [true; MOTORS];
         run
+    }
+
+    /// The board's motors stand, at rest, where they do at this position; their drivers are on.
+    pub(super) const fn stand_at(&mut self, counts: [i32; MOTORS], position: Position) {
+        self.counts = counts;
+        self.counts_at_start = counts;
+        self.position_at_start = position;
+        self.enabled = [true; MOTORS];
     }
 
     /// Gives a board that has dropped its queue the steps again that it had not made, before those that are pushed next:

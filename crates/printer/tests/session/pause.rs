@@ -10,7 +10,7 @@ use units::{Seconds, Ticks};
 use virtual_printer::BoardProfile;
 
 use crate::{
-    attach::{die, file, setup, started, take_up},
+    attach::{die, file, setup, started, take_up, take_up_paused},
     bench::{Bench, Setup},
     hold::{holds, stall},
     print::squares,
@@ -74,6 +74,15 @@ fn print_steps(bench: &Bench, from: usize) -> Vec<Step> {
     // Those of one tick have no order among motors.
     steps.sort_unstable();
     steps
+}
+
+/// Each motor's steps in their order, without those from one place to another.
+fn steps_of(bench: &Bench, from: usize, without: Option<(usize, usize)>) -> Vec<Vec<bool>> {
+    let is_own = |index: usize| without.is_none_or(|(begin, end)| !(begin..end).contains(&index));
+    let pulses = bench.pulses().iter().enumerate().skip(from).filter(|(index, _)| is_own(*index));
+    let pulses: Vec<_> = pulses.map(|(_, pulse)| *pulse).collect();
+    let of = |motor: usize| pulses.iter().filter(move |pulse| pulse.1 == motor).map(|pulse| pulse.2);
+    (0..4).map(|motor| of(motor).collect()).collect()
 }
 
 fn random(seed: u64) -> impl FnMut(f64, f64) -> f64 {
@@ -203,13 +212,6 @@ fn hosts_may_die_at_any_moment_around_a_pause() {
     let file = file();
     let (mut bench, from) = started(&setup, &file);
     bench.job_over();
-    let steps_of = |bench: &Bench, from: usize, without: Option<(usize, usize)>| -> Vec<Vec<bool>> {
-        let is_own = |index: usize| without.is_none_or(|(begin, end)| !(begin..end).contains(&index));
-        let pulses = bench.pulses().iter().enumerate().skip(from).filter(|(index, _)| is_own(*index));
-        let pulses: Vec<_> = pulses.map(|(_, pulse)| *pulse).collect();
-        let of = |motor: usize| pulses.iter().filter(move |pulse| pulse.1 == motor).map(|pulse| pulse.2);
-        (0..4).map(|motor| of(motor).collect()).collect()
-    };
     let expected = steps_of(&bench, from, None);
     drop(bench);
     for seed in 0..12 {
@@ -248,6 +250,50 @@ fn hosts_may_die_at_any_moment_around_a_pause() {
         bench.job_over();
         bench.job_done();
         assert!(steps_of(&bench, from, None) == expected, "{hundredth}");
+    }
+}
+
+/// The first host dies while the head is on its way to the park position, there, or on its way back.
+#[test]
+fn a_host_may_die_while_the_head_is_parked() {
+    for board in [BoardProfile::rp2040(), BoardProfile::stm32f103()] {
+        let setup = setup(board);
+        let file = file();
+        let (mut bench, from) = started(&setup, &file);
+        bench.job_over();
+        let expected = steps_of(&bench, from, None);
+        drop(bench);
+        for seed in 0..14 {
+            let mut between = random(seed);
+            let (mut bench, from) = started(&setup, &file);
+            bench.run(between(0.3, 8.0));
+            bench.ask(Request::Pause);
+            bench.until("the rest", 10.0, |bench| !cuts(bench).is_empty());
+            let cut = cuts(&bench)[0];
+            let begin = bench.pulses().partition_point(|pulse| pulse.0 <= cut);
+            let is_parked = seed % 2 == 0;
+            bench.run(if is_parked { between(1.0, 2.0) } else { between(0.0, 0.8) });
+            if seed % 4 == 0 {
+                bench.until("the pause", 30.0, |bench| bench.session.job_status() == JobStatus::Paused);
+                bench.gcode("G91\nG1 X-5 Y3 F3000\nG1 Z2");
+                bench.ask(Request::Resume);
+                bench.run(between(0.0, 0.5));
+            }
+            for _ in 0..1 + seed % 3 {
+                die(&mut bench, &setup, between(0.0, 5.0));
+                take_up_paused(&mut bench, &file);
+            }
+            bench.ask(Request::Resume);
+            let resumed = |event: &Event| matches!(event, Event::RunResumed { .. });
+            bench.until("going on", 30.0, |bench| bench.events.iter().any(resumed));
+            let end = bench.pulses().len();
+            bench.job_over();
+            bench.job_done();
+            assert!(bench.state().motors.iter().all(|motor| motor.lost.0 == 0));
+            assert!(steps_of(&bench, from, Some((begin, end))) == expected, "{seed} on {}", setup.board.name);
+            let made: i64 = bench.pulses()[begin..end].iter().map(|pulse| if pulse.2 { 1 } else { -1 }).sum();
+            assert_eq!(made, 0, "it did not come back to the very step");
+        }
     }
 }
 

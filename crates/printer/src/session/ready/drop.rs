@@ -27,7 +27,8 @@ use crate::{
 impl Ready {
     /// Has motion come to rest on its path, whatever holds it already; `false` where that cannot be, or nothing moves.
     pub(super) fn hold_motion(&mut self, purpose: Purpose, now: Seconds) -> bool {
-        let moves = purpose == Purpose::GoOn || self.stream.run().is_some_and(|run| !run.homing);
+        let moves = matches!(purpose, Purpose::GoOn | Purpose::Parked)
+            || self.stream.run().is_some_and(|run| !run.homing);
         if !moves || !self.board.layout.has_motion_clock {
             return false;
         }
@@ -83,10 +84,12 @@ impl Ready {
         hold.phase = Phase::AtRest;
         let can_go_on = self.job.as_ref().is_some_and(|job| job.paused.is_some() && !job.is_ending());
         match hold.purpose {
-            Purpose::Pause if self.job.as_ref().is_some_and(Job::is_ending) => drop(self.cancel_held(now)),
+            Purpose::Pause | Purpose::Parked if self.job.as_ref().is_some_and(Job::is_ending) => {
+                self.cancel_held(now);
+            }
             // What another host began is first made this one's own.
             Purpose::Pause if hold.rest.is_some() => hold.phase = hold.warm(now),
-            Purpose::Pause => self.drop_queue(now),
+            Purpose::Pause | Purpose::Parked => self.drop_queue(now),
             Purpose::GoOn if can_go_on => {
                 hold.purpose = Purpose::Ask;
                 hold.phase = Phase::Resuming(None);
@@ -98,8 +101,19 @@ impl Ready {
                 }
                 self.rejoin_cut(now);
             }
-            Purpose::GoOn | Purpose::End => drop(self.cancel_held(now)),
+            Purpose::GoOn | Purpose::End => {
+                self.cancel_held(now);
+            }
             Purpose::Ask => {}
+        }
+    }
+
+    /// The head of a job that another host had put aside stands where its motors' counts say.
+    pub(super) fn stand_parked(&mut self, counts: &[i32; MOTORS], now: Seconds) {
+        self.stand_at(counts, now);
+        let cut = self.job.as_ref().and_then(|job| job.paused.as_ref()).and_then(|it| it.cut.as_ref());
+        if let Some(fan) = cut.map(|cut| cut.left.fan) {
+            self.thermal.set_fan(fan, None, &mut self.board, now);
         }
     }
 

@@ -66,6 +66,8 @@ pub(super) enum Purpose {
     Pause,
     /// … and goes on where it was.
     GoOn,
+    /// Another host has put the job aside: what that was doing with the head is broken off.
+    Parked,
     /// What is being made is ended.
     End,
 }
@@ -231,8 +233,10 @@ impl Ready {
         if hold.is_told && !matches!(hold.phase, Phase::Leaving { .. }) {
             self.events.push(Event::Resumed);
         }
-        if hold.purpose == Purpose::Pause {
-            self.park(now);
+        match hold.purpose {
+            Purpose::Pause => self.park(now),
+            Purpose::Parked => self.is_parked(now),
+            Purpose::Ask | Purpose::GoOn | Purpose::End => {}
         }
     }
 
@@ -376,6 +380,8 @@ impl Ready {
                     hold.phase = Phase::Leaving { asked: Seconds(f64::NEG_INFINITY) };
                     if hold.purpose == Purpose::Pause {
                         self.put_aside(&queues, hold.targets.clone(), hold.could_extrude, now)?;
+                    } else if hold.purpose == Purpose::Parked {
+                        self.stand_parked(&queues.map(|queue| queue.position), now);
                     } else {
                         self.stand_at(&queues.map(|queue| queue.position), now);
                     }

@@ -10,6 +10,7 @@ mod pause;
 mod plan;
 mod start;
 mod take_up;
+mod take_up_parked;
 mod waiting;
 
 use gcode::LineNumber;

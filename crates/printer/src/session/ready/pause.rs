@@ -6,6 +6,7 @@ use units::{Mm, MmPerS, Seconds};
 
 use super::{Failure, Ready, hold::Purpose};
 use crate::{
+    error::PrinterError,
     journal::MotorQueue,
     machine::{self, EXTRUDER, MOTORS},
     planner::{ExtrusionPermit, Planner},
@@ -45,6 +46,9 @@ impl Ready {
             }
             None => self.planner.position(),
         };
+        let retracted = self.retraction(position[EXTRUDER]);
+        let retract = retracted.map_or(0.0, |of| of.from - of.to);
+        self.diary.park(queues, cut.is_some(), retract, &mut self.board);
         let homed = self.planner.guard.homed();
         let mut aside = Planner::new(&self.config, self.board.clock).map_err(Failure::Stop)?;
         aside.stand_at(position);
@@ -63,7 +67,7 @@ impl Ready {
                 targets,
                 start: None,
                 cut: cut.map(Box::new),
-                retracted: None,
+                retracted,
             });
         }
         Ok(())
@@ -78,23 +82,25 @@ impl Ready {
         }
     }
 
+    /// How far the filament is pulled back, if that is possible.
+    fn retraction(&self, from: f64) -> Option<Retracted> {
+        let length = self.config.firmware_retraction.as_ref().map_or(RETRACT, |it| it.retract_length);
+        let may_retract = length > Mm(0.0)
+            && self.config.extruder.is_some()
+            && self.extrusion_permit() == ExtrusionPermit::Allowed;
+        may_retract.then_some(Retracted { from, to: from - length.0 })
+    }
+
     /// Pulls the filament back, lifts, and goes to the place that the machine file names, as far as that is safe.
-    fn plan_park(&mut self) -> Result<(), crate::error::PrinterError> {
+    fn plan_park(&mut self) -> Result<(), PrinterError> {
         let mut to = self.planner.position();
         let homed = self.planner.guard.homed();
-        let may_retract =
-            self.config.extruder.is_some() && self.extrusion_permit() == ExtrusionPermit::Allowed;
-        let (length, speed) = match &self.config.firmware_retraction {
-            Some(retraction) => (retraction.retract_length, retraction.retract_speed),
-            None => (RETRACT, RETRACT_SPEED),
-        };
-        if may_retract && length > Mm(0.0) {
-            let from = to[EXTRUDER];
-            to[EXTRUDER] -= length.0;
-            self.planner.push_raw_move(to, speed, gcode::LineNumber(0))?;
-            if let Some(paused) = self.job.as_mut().and_then(|job| job.paused.as_mut()) {
-                paused.retracted = Some(Retracted { from, to: to[EXTRUDER] });
-            }
+        let retracted =
+            self.job.as_ref().and_then(|job| job.paused.as_ref()).and_then(|paused| paused.retracted);
+        if let Some(retracted) = retracted {
+            to[EXTRUDER] = retracted.to;
+            let speed = self.config.firmware_retraction.as_ref().map(|it| it.retract_speed);
+            self.planner.push_raw_move(to, speed.unwrap_or(RETRACT_SPEED), gcode::LineNumber(0))?;
         }
         if homed[2] {
             let z_max = self.config.steppers[2].position_max.0;

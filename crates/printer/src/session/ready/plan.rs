@@ -106,6 +106,8 @@ impl Ready {
                 self.lease.forget();
                 if !homing && self.plans_job() {
                     self.diary.run(run.start, &mut self.board);
+                } else if homing {
+                    self.diary.lose_place(&mut self.board);
                 } else {
                     self.diary.other_run(&mut self.board);
                 }
@@ -141,8 +143,15 @@ impl Ready {
 
     /// A move has its place on the motion clock.
     pub(super) fn schedule_move(&mut self, planned: &PlannedMove, run: Run) {
+        let scheduled = self.scheduled(planned, run);
+        self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
+        self.events.push(Event::Move(scheduled));
+    }
+
+    /// Where a move has its place.
+    pub(super) fn scheduled(&self, planned: &PlannedMove, run: Run) -> ScheduledMove {
         let at = |time: f64| run.start + self.board.ticks(Seconds(time));
-        let scheduled = ScheduledMove {
+        ScheduledMove {
             line: planned.tag,
             start: at(planned.start_time),
             end: at(planned.end_time()),
@@ -150,9 +159,7 @@ impl Ready {
             to: planned.to,
             speed: SpeedProfile::new(planned, at),
             homing: run.homing,
-        };
-        self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
-        self.events.push(Event::Move(scheduled));
+        }
     }
 
     /// Notes what a job leaves behind.
