@@ -24,14 +24,16 @@ pub(crate) use self::{
 
 use crate::{config::PrinterConfig, machine::MOTORS, planner::Position};
 
-/// The format that is written, and the only one that is read.
-pub const FORMAT: u32 = 1;
+/// The format that is written.
+pub const FORMAT: u32 = 2;
+/// The formats that are read. The first does not say where Z's motor stands.
+const FORMATS: core::ops::RangeInclusive<u32> = 1..=FORMAT;
 /// The most bytes that wait for the owner. One that takes none keeps no journal.
 pub const PENDING_BYTES_MAX: usize = 1024 * 1024;
 /// The most bytes of a journal that are read: a print of weeks.
 pub const JOURNAL_BYTES_MAX: usize = 64 * 1024 * 1024;
-/// Progress is written no more often than this.
-pub const PROGRESS_INTERVAL: Seconds = Seconds(2.0);
+/// Progress is written no more often than this, and with no more delay than this: some 5 MB in a day of printing.
+pub const PROGRESS_INTERVAL: Seconds = Seconds(1.0);
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
@@ -187,8 +189,36 @@ pub enum Record {
         /// Print time in seconds.
         elapsed: f64,
     },
+    /// What is known of where the Z axis stands.
+    Height(Height),
     /// The print is over, one way or another.
     Ended,
+}
+
+/// What is known of where the Z axis stands: its position is one thing, how far its motor has been turned another.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Height {
+    /// At this position in mm …
+    pub z: f64,
+    /// … the board counted its motor here, in microsteps towards higher positions.
+    pub count: i32,
+    /// The board has counted since its drivers were powered up, as far as is known: from the count follows how they have
+    /// set the motor's coils.
+    pub since_power_up: bool,
+    /// Who moves it.
+    pub by: MovedBy,
+}
+
+/// Who moves the Z axis from a place of the journal on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MovedBy {
+    /// The lines of the file.
+    File,
+    /// Nobody: it rests there.
+    Nobody,
+    /// Something that is not in the journal: homing, or the user in a pause. Position and count are those before.
+    Others,
 }
 
 /// What distinguishes a machine from others, as far as a plan depends on it.
@@ -260,6 +290,8 @@ pub struct Journal {
     last_id: u32,
     /// The line of the last move that was seen to be made, and the print time then.
     pub progress: Option<(u32, Seconds)>,
+    /// What was last known of where the Z axis stands.
+    pub height: Option<Height>,
     /// Whether the print is over.
     pub has_ended: bool,
     /// Bytes that could be read; what follows them was torn off or damaged.
@@ -310,7 +342,7 @@ impl Journal {
         else {
             return Err(JournalError::NoBegin);
         };
-        if format != FORMAT {
+        if !FORMATS.contains(&format) {
             return Err(JournalError::Format(format));
         }
         Ok(Self {
@@ -327,6 +359,7 @@ impl Journal {
             parked: Vec::new(),
             last_id: print,
             progress: None,
+            height: None,
             has_ended: false,
             bytes: 0,
         })
@@ -345,9 +378,33 @@ impl Journal {
                 self.parked.push(parked);
             }
             Record::Progress { line, elapsed } => self.progress = Some((line, Seconds(elapsed))),
+            Record::Height(height) => self.height = Some(height),
             // A second begin belongs to another print, which has no place in this journal.
             Record::Began { .. } | Record::Ended => self.has_ended = true,
         }
+    }
+
+    /// The speed and flow factors that the user set last, where they did.
+    pub fn factors(&self) -> [Option<f64>; 2] {
+        let mut factors = [None; 2];
+        for (_, input) in &self.inputs {
+            match *input {
+                Input::Speed(factor) => factors[0] = Some(factor),
+                Input::Flow(factor) => factors[1] = Some(factor),
+                Input::FinishRun | Input::Fan(_) | Input::Target(..) => {}
+            }
+        }
+        factors
+    }
+
+    /// Where the machine stood when the print began, where it began with its file.
+    pub(crate) fn began_at(&self) -> Option<Position> {
+        self.start_line.is_none().then_some(self.position)
+    }
+
+    /// Whether it was begun on this machine.
+    pub(crate) fn is_of(&self, config: &PrinterConfig) -> bool {
+        self.machine == machine_check(config)
     }
 
     /// Whether a board that counts under this number carries out this print.
@@ -379,120 +436,4 @@ fn next_record(bytes: &[u8]) -> Option<(Record, &[u8])> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn began() -> Record {
-        Record::Began {
-            format: FORMAT,
-            print: 7,
-            machine: 1,
-            clock: 12_000_000,
-            position: [0.1 + 0.2, 1.0 / 3.0, f64::MIN_POSITIVE, 4.0],
-            homed: [true, false, true],
-            confirmed: [3, 9].into(),
-            confirm_all: false,
-            start_line: None,
-        }
-    }
-
-    fn written(records: &[Record]) -> String {
-        let mut writer = Writer::default();
-        for record in records {
-            writer.write(record);
-        }
-        writer.take()
-    }
-
-    #[test]
-    fn what_was_written_is_read_to_the_last_bit() {
-        let at = Place { items: 12, drained: Some(345) };
-        let from = [RowPlace { done: 1, left: 2 }; MOTORS];
-        let dropped = Dropped { received: 7, done: 5, left: 3, dir: true, position: -77, crc: u32::MAX };
-        let records = [
-            began(),
-            Record::Input { at, input: Input::Speed(0.1 + 0.7) },
-            Record::Input { at, input: Input::FinishRun },
-            Record::Run { id: 8, run: 1, start: u32::MAX, from },
-            Record::Continued { inputs: 1 },
-            Record::Input { at, input: Input::Target(HeaterName::Bed, 60.5) },
-            Record::Parked(Parked {
-                id: 9,
-                of: 8,
-                is_cut: true,
-                motors: [dropped; MOTORS],
-                retract: 0.1 + 0.2,
-            }),
-            Record::Progress { line: 77, elapsed: 1.5 },
-        ];
-        let text = written(&records);
-        let journal = Journal::read(text.as_bytes()).unwrap();
-        assert_eq!(
-            journal.position.map(f64::to_bits),
-            [0.1 + 0.2, 1.0 / 3.0, f64::MIN_POSITIVE, 4.0].map(f64::to_bits)
-        );
-        assert_eq!(
-            journal.inputs,
-            [(at, Input::Speed(0.1 + 0.7)), (at, Input::Target(HeaterName::Bed, 60.5))]
-        );
-        assert!(journal.knows(8) && journal.knows(9) && !journal.knows(7) && !journal.has_ended);
-        let board = BoardQueue { id: 9, ..BoardQueue::default() };
-        let (queue, parked) = journal.unparked(board);
-        assert_eq!((queue.id, queue.is_held, queue.motors[2].left), (8, true, 3));
-        assert_eq!((parked.unwrap().retract.to_bits(), journal.last_id), ((0.1_f64 + 0.2).to_bits(), 9));
-        assert_eq!(journal.unparked(queue), (queue, None));
-        assert_eq!((journal.progress, journal.bytes), (Some((77, Seconds(1.5))), text.len()));
-        assert!(Journal::read((text + &written(&[Record::Ended])).as_bytes()).unwrap().has_ended);
-    }
-
-    #[test]
-    fn what_is_none_of_ours_is_refused() {
-        let mut other = began();
-        if let Record::Began { format, .. } = &mut other {
-            *format = 2;
-        }
-        assert_eq!(Journal::read(written(&[other]).as_bytes()), Err(JournalError::Format(2)));
-        for bytes in [&b""[..], b"\n", b"00000000 {}\n", written(&[Record::Ended]).as_bytes()] {
-            assert_eq!(Journal::read(bytes), Err(JournalError::NoBegin));
-        }
-        // Two prints in one journal are none.
-        assert!(Journal::read(written(&[began(), began()]).as_bytes()).unwrap().has_ended);
-    }
-
-    #[test]
-    fn a_writer_that_nobody_reads_stops_and_says_no_more() {
-        let mut writer = Writer::default();
-        (0..100_000).for_each(|line| writer.write(&Record::Progress { line, elapsed: 0.0 }));
-        assert!(writer.take().len() <= PENDING_BYTES_MAX);
-        writer.write(&Record::Ended);
-        assert_eq!(writer.take(), "");
-    }
-
-    proptest! {
-        #[test]
-        fn damage_never_adds_anything(flips in prop::collection::vec((0..600_usize, 1..=255_u8), 1..4)) {
-            let records = [
-                began(),
-                Record::Run { id: 8, run: 1, start: 5, from: [RowPlace::default(); MOTORS] },
-                Record::Progress { line: 1, elapsed: 1.0 },
-                Record::Ended,
-            ];
-            let mut bytes = written(&records).into_bytes();
-            for (at, mask) in flips {
-                let len = bytes.len();
-                bytes[at % len] ^= mask;
-            }
-            // It is what was written up to the damage.
-            if let Ok(journal) = Journal::read(&bytes) {
-                let whole = |count: usize| Journal::read(written(&records[..count]).as_bytes()).unwrap();
-                prop_assert!((1..=4).any(|count| whole(count) == journal));
-            }
-        }
-
-        #[test]
-        fn anything_can_be_read(bytes: Vec<u8>) {
-            drop(Journal::read(&bytes));
-        }
-    }
-}
+mod tests;

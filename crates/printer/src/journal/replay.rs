@@ -15,7 +15,7 @@ use units::{Celsius, Clock32, Seconds, Ticks};
 use wire::RowCheck;
 
 use super::{
-    CountedRun, Input, Journal, Parked, Place, RowPlace, machine_check,
+    CountedRun, Height, Input, Journal, Parked, Place, RowPlace, machine_check,
     rows::{BoardQueue, Row},
 };
 use crate::{
@@ -87,6 +87,8 @@ pub(crate) struct Continuation {
     pub(crate) id: u32,
     /// How it was put aside, where it was.
     pub(crate) parked: Option<Parked>,
+    /// What was last written of where Z stands.
+    pub(crate) height: Option<Height>,
 }
 
 /// How far a replay is.
@@ -124,6 +126,7 @@ pub(crate) struct Replay {
     /// The last number in the journal.
     last_id: u32,
     parked: Option<Parked>,
+    height: Option<Height>,
     /// Reads up to the line with which the print begins.
     skip: Option<Skip>,
     is_done: bool,
@@ -183,6 +186,7 @@ impl Replay {
             elapsed: Seconds::ZERO,
             last_id: journal.last_id,
             parked,
+            height: journal.height,
             skip: journal.start_line.map(|line| Skip::new(line, endstops)),
             is_done: false,
         })
@@ -284,6 +288,7 @@ impl Replay {
             elapsed: self.elapsed,
             id: self.last_id,
             parked: self.parked,
+            height: self.height,
         }
     }
 

@@ -130,7 +130,9 @@ mod tests {
         let from = RowPlace { done: 10, left: 4 };
         kept.begin([from; MOTORS]);
         for motor in 0..MOTORS {
-            [row(0, 4), row(400, 5), row(900, 6)].into_iter().for_each(|row| kept.push(motor, row));
+            for row in [row(0, 4), row(400, 5), row(900, 6)] {
+                kept.push(motor, row);
+            }
         }
         kept
     }
@@ -168,7 +170,9 @@ mod tests {
     #[test]
     fn the_fan_is_what_it_was_last() {
         let mut kept = kept();
-        [(10, 0.1), (20, 0.2), (30, 0.3)].into_iter().for_each(|(at, speed)| kept.push_fan(Ticks(at), speed));
+        for (at, speed) in [(10, 0.1), (20, 0.2), (30, 0.3)] {
+            kept.push_fan(Ticks(at), speed);
+        }
         kept.forget(Ticks(0), Ticks(20));
         let left = kept.cut(&[queue(0, 0); MOTORS]).unwrap();
         assert_eq!((left.fan, left.fans), (0.2, VecDeque::from([(Ticks(30), 0.3)])));

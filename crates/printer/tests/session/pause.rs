@@ -279,7 +279,7 @@ fn a_host_may_die_while_the_head_is_parked() {
                 bench.ask(Request::Resume);
                 bench.run(between(0.0, 0.5));
             }
-            for _ in 0..1 + seed % 3 {
+            for _ in 0..=(seed % 3) {
                 die(&mut bench, &setup, between(0.0, 5.0));
                 take_up_paused(&mut bench, &file);
             }

@@ -72,8 +72,14 @@ pub(super) struct Observer {
     new_run: Option<Ticks>,
     /// Where the present run began, unless it homes.
     run_start: Option<Ticks>,
+    is_homing: bool,
     /// Where the first run began that does not home.
     pub(super) began: Option<Ticks>,
+    /// The same, of the run that was put aside in a pause, where one was …
+    aside: Option<Option<Ticks>>,
+    aside_until: Ticks,
+    /// … and the moves of runs that were are told again.
+    repeats: bool,
     /// Another host has taken the first one's place: it tells of moves again that were planned before.
     pub(super) is_taken_up: bool,
     /// The end of the last move that was told.
@@ -106,7 +112,11 @@ impl Observer {
             done: false,
             new_run: None,
             run_start: None,
+            is_homing: false,
             began: None,
+            aside: None,
+            aside_until: Ticks(0),
+            repeats: false,
             is_taken_up: false,
             told_until: Ticks(0),
             last_change: start,
@@ -128,6 +138,8 @@ impl Observer {
             }
             Event::RunStarted { at, .. } => self.new_run = Some(self.clock_of(at, printer)),
             Event::Move(scheduled) => self.take_move(&scheduled, printer),
+            Event::RunBroken { at } if !self.is_homing => self.put_aside(at, printer),
+            Event::RunResumed { broken, at } => self.go_on(broken, at, printer),
             Event::RunEnded { at } => {
                 if let Some(start) = self.run_start.take() {
                     let at = self.clock_of(at, printer);
@@ -184,14 +196,15 @@ impl Observer {
     fn take_move(&mut self, scheduled: &ScheduledMove, printer: &mut VirtualPrinter<Tally>) {
         let &ScheduledMove { line, from, to, homing, .. } = scheduled;
         let [start, end] = [scheduled.start, scheduled.end].map(|at| self.clock_of(at, printer));
-        if self.is_taken_up && end <= self.told_until {
+        if (self.is_taken_up || self.repeats) && end <= self.told_until {
             return;
         }
         self.told_until = end;
         let tally = printer.recorder_mut();
         if let Some(at) = self.new_run.take() {
             tally.digest.expect_run(at, homing);
-            self.run_start = (!homing).then_some(at);
+            self.is_homing = homing;
+            self.run_start = (!homing && self.aside.is_none()).then_some(at);
             self.began = self.began.or(self.run_start);
         }
         self.plan_steps(scheduled);
@@ -215,6 +228,27 @@ impl Observer {
             self.mismatch
                 .get_or_insert_with(|| format!("line {line} was planned too far ahead to be followed"));
         }
+    }
+
+    /// The present run is put aside in a pause.
+    fn put_aside(&mut self, at: Ticks, printer: &mut VirtualPrinter<Tally>) {
+        self.aside = Some(self.run_start.take());
+        self.aside_until = self.told_until;
+        let at = self.clock_of(at, printer);
+        let tally = printer.recorder_mut();
+        tally.digest.put_aside();
+        tally.path.put_aside(at);
+    }
+
+    /// It goes on, so much later.
+    fn go_on(&mut self, broken: Ticks, at: Ticks, printer: &mut VirtualPrinter<Tally>) {
+        let by = Ticks(at.0.saturating_sub(broken.0));
+        self.run_start = self.aside.take().flatten().map(|start| start + by);
+        self.repeats = true;
+        let tally = printer.recorder_mut();
+        tally.digest.go_on(by);
+        tally.path.go_on(by);
+        self.told_until = self.aside_until + by;
     }
 
     /// A motion clock of the session's in 64 bits as the machine has them: a host that came later knows only 32.

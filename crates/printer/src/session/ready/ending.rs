@@ -5,6 +5,7 @@ use units::Seconds;
 use super::{Held, Ready, Wait, hold::Purpose};
 use crate::{
     error::{Ended, ErrorCode, PrinterError},
+    journal::MovedBy,
     planner::{ExtrusionPermit, Planner},
     session::{
         event::Event,
@@ -167,17 +168,19 @@ impl Ready {
             }
             return;
         }
+        if self.diary.is_z_moved_by_others() && self.planner.guard.homed()[2] {
+            self.note_height(self.planner.position()[2], MovedBy::Nobody);
+        }
         let state = self.job.as_ref().map(|job| job.state.clone());
         match state {
             Some(JobState::Pausing) => self.is_paused(now),
             Some(JobState::Parking) => self.is_parked(now),
-            // The board has yet to hold, or to be told to go on.
-            Some(JobState::Halting) => {}
+            // The board has yet to hold for it to go on.
             Some(JobState::Returning) if self.is_holding() => {}
             Some(JobState::Returning) => self.has_returned(now),
             Some(JobState::Cancelling) => self.end_job(Event::JobCancelled, now),
             Some(JobState::Failing(error)) => self.end_job(Event::Error(error), now),
-            Some(JobState::Printing | JobState::Skipping) => {}
+            Some(JobState::Printing | JobState::Skipping | JobState::Halting) => {}
             Some(JobState::Paused) | None => self.idle(now),
         }
     }

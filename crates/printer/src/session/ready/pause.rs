@@ -7,7 +7,7 @@ use units::{Mm, MmPerS, Seconds};
 use super::{Failure, Ready, hold::Purpose};
 use crate::{
     error::PrinterError,
-    journal::MotorQueue,
+    journal::{MotorQueue, MovedBy},
     machine::{self, EXTRUDER, MOTORS},
     planner::{ExtrusionPermit, Planner},
     session::{
@@ -147,6 +147,7 @@ impl Ready {
         let Cut { at: broken, .. } = *cut;
         let at = self.board.motion_at(now);
         let (from, fans) = (cut.left.from, cut.left.fans.clone());
+        self.note_height(paused.position[2], MovedBy::File);
         self.planner = *paused.planner;
         let (run, moves) = self.stream.rejoin(*cut, at, &self.board);
         if let Some(job) = &mut self.job {
@@ -162,6 +163,8 @@ impl Ready {
             self.thermal.set_fan(speed, Some(clock), &mut self.board, now);
         }
         self.events.push(Event::RunResumed { broken, at });
-        moves.into_iter().for_each(|mv| self.events.push(Event::Move(mv)));
+        for mv in moves {
+            self.events.push(Event::Move(mv));
+        }
     }
 }

@@ -148,7 +148,8 @@ impl Rest {
     pub(super) fn adopt(&mut self, input: Input) {
         match input {
             Input::Target(heater, celsius) => {
-                self.pass(&TimedAction::SetTemperature { heater: heater.heater(), target: Celsius(celsius) })
+                let (heater, target) = (heater.heater(), Celsius(celsius));
+                self.pass(&TimedAction::SetTemperature { heater, target });
             }
             Input::Fan(speed) => self.fan = speed,
             Input::FinishRun | Input::Speed(_) | Input::Flow(_) => {}
