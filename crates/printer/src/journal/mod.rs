@@ -128,6 +128,8 @@ pub struct Parked {
     pub is_cut: bool,
     /// Where each motor stood.
     pub motors: [Dropped; MOTORS],
+    /// The low half of the motion clock then.
+    pub rest: u32,
     /// The filament that is pulled back, in mm.
     pub retract: f64,
 }

@@ -37,7 +37,14 @@ fn what_was_written_is_read_to_the_last_bit() {
         Record::Run { id: 8, run: 1, start: u32::MAX, from },
         Record::Continued { inputs: 1 },
         Record::Input { at, input: Input::Target(HeaterName::Bed, 60.5) },
-        Record::Parked(Parked { id: 9, of: 8, is_cut: true, motors: [dropped; MOTORS], retract: 0.1 + 0.2 }),
+        Record::Parked(Parked {
+            id: 9,
+            of: 8,
+            is_cut: true,
+            motors: [dropped; MOTORS],
+            rest: 3,
+            retract: 0.1 + 0.2,
+        }),
         Record::Progress { line: 77, elapsed: 1.5 },
     ];
     let text = written(&records);

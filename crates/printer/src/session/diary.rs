@@ -169,6 +169,7 @@ impl Diary {
         &mut self,
         queues: &[MotorQueue; MOTORS],
         is_cut: bool,
+        rest: Ticks,
         retract: f64,
         board: &mut Board,
     ) {
@@ -181,7 +182,7 @@ impl Diary {
             let MotorQueue { received, done, left, dir, position, crc, .. } = queue;
             Dropped { received, done, left, dir, position, crc }
         });
-        self.writer.write(&Record::Parked(Parked { id, of, is_cut, motors, retract }));
+        self.writer.write(&Record::Parked(Parked { id, of, is_cut, motors, rest: rest.low().0, retract }));
     }
 
     /// A run begins that is none of the job's. Unless the job was put aside, it cannot be taken up any more.

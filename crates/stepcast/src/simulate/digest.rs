@@ -51,18 +51,25 @@ pub(crate) struct Digest {
     base: Option<u64>,
     runs: u64,
     /// The run that was put aside in a pause: where its first step was, or when it was to begin.
-    aside: Option<(Option<u64>, VecDeque<(Ticks, bool)>)>,
+    aside: Option<Aside>,
+}
+
+#[derive(Clone, Debug)]
+struct Aside {
+    base: Option<u64>,
+    ahead: VecDeque<(Ticks, bool)>,
 }
 
 impl Digest {
     /// The present run is put aside: what is made until it goes on does not count.
     pub(crate) fn put_aside(&mut self) {
-        self.aside = Some((self.base.take(), core::mem::take(&mut self.ahead)));
+        let (base, ahead) = (self.base.take(), core::mem::take(&mut self.ahead));
+        self.aside = Some(Aside { base, ahead });
     }
 
     /// The run that was put aside goes on, so much later.
     pub(crate) fn go_on(&mut self, by: Ticks) {
-        if let Some((base, ahead)) = self.aside.take() {
+        if let Some(Aside { base, ahead }) = self.aside.take() {
             self.base = base.map(|base| base + by.0);
             self.ahead = ahead.into_iter().map(|(at, homing)| (at + by, homing)).collect();
         }

@@ -45,6 +45,14 @@ pub(super) enum Wish {
     End,
 }
 
+/// A run that was put aside: when, where it began unless it has been told to its end, and the end of its last move.
+#[derive(Clone, Copy, Debug)]
+struct Aside {
+    at: Ticks,
+    run_start: Option<Ticks>,
+    told_until: Ticks,
+}
+
 /// Follows a print.
 pub(super) struct Observer {
     step_distance_mm: [f64; MOTORS],
@@ -75,10 +83,9 @@ pub(super) struct Observer {
     is_homing: bool,
     /// Where the first run began that does not home.
     pub(super) began: Option<Ticks>,
-    /// The same, of the run that was put aside in a pause, where one was …
-    aside: Option<Option<Ticks>>,
-    aside_until: Ticks,
-    /// … and the moves of runs that were are told again.
+    /// The run that is put aside in a pause …
+    aside: Option<Aside>,
+    /// … and the moves of those that were are told again.
     repeats: bool,
     /// Another host has taken the first one's place: it tells of moves again that were planned before.
     pub(super) is_taken_up: bool,
@@ -115,7 +122,6 @@ impl Observer {
             is_homing: false,
             began: None,
             aside: None,
-            aside_until: Ticks(0),
             repeats: false,
             is_taken_up: false,
             told_until: Ticks(0),
@@ -139,7 +145,7 @@ impl Observer {
             Event::RunStarted { at, .. } => self.new_run = Some(self.clock_of(at, printer)),
             Event::Move(scheduled) => self.take_move(&scheduled, printer),
             Event::RunBroken { at } if !self.is_homing => self.put_aside(at, printer),
-            Event::RunResumed { broken, at } => self.go_on(broken, at, printer),
+            Event::RunResumed { at, .. } => self.go_on(at, printer),
             Event::RunEnded { at } => {
                 if let Some(start) = self.run_start.take() {
                     let at = self.clock_of(at, printer);
@@ -232,23 +238,25 @@ impl Observer {
 
     /// The present run is put aside in a pause.
     fn put_aside(&mut self, at: Ticks, printer: &mut VirtualPrinter<Tally>) {
-        self.aside = Some(self.run_start.take());
-        self.aside_until = self.told_until;
         let at = self.clock_of(at, printer);
+        let (run_start, told_until) = (self.run_start.take(), self.told_until);
+        self.aside = Some(Aside { at, run_start, told_until });
         let tally = printer.recorder_mut();
         tally.digest.put_aside();
         tally.path.put_aside(at);
     }
 
-    /// It goes on, so much later.
-    fn go_on(&mut self, broken: Ticks, at: Ticks, printer: &mut VirtualPrinter<Tally>) {
-        let by = Ticks(at.0.saturating_sub(broken.0));
-        self.run_start = self.aside.take().flatten().map(|start| start + by);
+    /// It goes on.
+    fn go_on(&mut self, at: Ticks, printer: &mut VirtualPrinter<Tally>) {
+        let at = self.clock_of(at, printer);
+        let Some(aside) = self.aside.take() else { return };
+        let by = at.saturating_sub(aside.at);
+        self.run_start = aside.run_start.map(|start| start + by);
+        self.told_until = aside.told_until + by;
         self.repeats = true;
         let tally = printer.recorder_mut();
         tally.digest.go_on(by);
         tally.path.go_on(by);
-        self.told_until = self.aside_until + by;
     }
 
     /// A motion clock of the session's in 64 bits as the machine has them: a host that came later knows only 32.

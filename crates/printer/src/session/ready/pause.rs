@@ -48,7 +48,7 @@ impl Ready {
         };
         let retracted = self.retraction(position[EXTRUDER]);
         let retract = retracted.map_or(0.0, |of| of.from - of.to);
-        self.diary.park(queues, cut.is_some(), retract, &mut self.board);
+        self.diary.park(queues, cut.is_some(), at, retract, &mut self.board);
         let homed = self.planner.guard.homed();
         let mut aside = Planner::new(&self.config, self.board.clock).map_err(Failure::Stop)?;
         aside.stand_at(position);

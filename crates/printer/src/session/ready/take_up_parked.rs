@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use units::{Seconds, Ticks};
+use units::{Clock32, Seconds, Ticks};
 
 use super::{Ready, hold::Purpose, take_up::Rest};
 use crate::{
@@ -59,7 +59,8 @@ impl Ready {
         let run = Run { start: Ticks(0), end: taken.end, homing: false };
         let mut cut = Cut {
             run,
-            at: taken.made_until,
+            // Of the clocks 32 bits are known, and the rest came soon after what had been made.
+            at: taken.made_until.nearest(Clock32(parked.rest.wrapping_sub(taken.start.0))),
             left: Left { rows: taken.backlog, from: taken.from, fan: 0.0, fans: VecDeque::new() },
             forward: taken.forward,
             made: core::array::from_fn(|motor| signed(motor, taken.made[motor])),
