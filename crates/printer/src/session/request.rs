@@ -110,6 +110,9 @@ impl Session {
         }
         let since_power_up = ready.board.since_power_up;
         ready.diary.begin(&job.options, &ready.config, &ready.planner, since_power_up, now);
+        if job.skip.is_none() {
+            ready.note_preheating();
+        }
         ready.last_active = now;
         ready.stream.reset_elapsed();
         job.told = now;

@@ -10,6 +10,7 @@ mod hold;
 mod link;
 mod machine;
 mod pause;
+mod power;
 mod print;
 mod start;
 mod stopping;

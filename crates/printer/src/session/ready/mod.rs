@@ -36,6 +36,7 @@ use super::{
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
+    journal::Input,
     machine,
     planner::{Planner, Source, TimedAction},
 };
@@ -162,7 +163,11 @@ impl Ready {
         self.note_call(now);
         // After a long pause nothing may be claimed of the motion clock, whose 32 bits say little then.
         self.lease.is_in_doubt(&mut self.board, now);
-        for (message, sent) in inbox::receive(&mut self.board.link, &self.board.dictionary, bytes, now) {
+        let messages = inbox::receive(&mut self.board.link, &self.board.dictionary, bytes, now);
+        if !messages.is_empty() {
+            self.diary.heard(now);
+        }
+        for (message, sent) in messages {
             if let Some(sent) = sent {
                 self.board.said_after = self.board.said_after.max(sent);
             }
@@ -314,6 +319,14 @@ impl Ready {
         }
     }
 
+    /// What heaters and fan have been set to before a job begins holds until its file says something else.
+    pub(super) fn note_preheating(&mut self) {
+        for (heater, target) in self.thermal.wanted() {
+            self.diary.target(heater, target.0);
+        }
+        self.diary.input(Input::Fan(self.thermal.fan_speed()));
+    }
+
     /// Whether a job that has been ended may still do this: what was read of it ahead must not switch anything on.
     fn is_allowed(&self, action: &TimedAction) -> bool {
         let is_ending = self.job.as_ref().is_some_and(Job::is_ending);
@@ -334,7 +347,12 @@ impl Ready {
                 }
             }
             TimedAction::TurnOffHeaters => self.thermal.all_off(&mut self.board, now),
-            TimedAction::Fan { speed, .. } => self.thermal.set_fan(speed, None, &mut self.board, now),
+            TimedAction::Fan { speed, .. } => {
+                if !self.plans_job() {
+                    self.diary.input(Input::Fan(speed));
+                }
+                self.thermal.set_fan(speed, None, &mut self.board, now);
+            }
             TimedAction::Message(text) => self.events.push(Event::Message(text)),
             TimedAction::Annotation(annotation) => self.events.push(Event::Annotation(annotation)),
             TimedAction::Object(object) => self.events.push(Event::Object(object)),
@@ -343,14 +361,6 @@ impl Ready {
                 let [x, y, z, e] = self.planner.position();
                 self.events.push(Event::Message(format!("X:{x:.3} Y:{y:.3} Z:{z:.3} E:{e:.3}")));
             }
-        }
-    }
-
-    /// The source whose G-code is being carried out.
-    fn source_mut(&mut self) -> &mut Source {
-        match &mut self.job {
-            Some(job) if job.is_active() => &mut job.source,
-            _ => &mut self.console.source,
         }
     }
 }

@@ -7,7 +7,7 @@ use units::{Mm, MmPerS, Seconds};
 use super::{Failure, Ready, hold::Purpose};
 use crate::{
     error::PrinterError,
-    journal::{MotorQueue, MovedBy},
+    journal::MotorQueue,
     machine::{self, EXTRUDER, MOTORS},
     planner::{ExtrusionPermit, Planner},
     session::{
@@ -147,7 +147,6 @@ impl Ready {
         let Cut { at: broken, .. } = *cut;
         let at = self.board.motion_at(now);
         let (from, fans) = (cut.left.from, cut.left.fans.clone());
-        self.note_height(paused.position[2], MovedBy::File);
         self.planner = *paused.planner;
         let (run, moves) = self.stream.rejoin(*cut, at, &self.board);
         if let Some(job) = &mut self.job {

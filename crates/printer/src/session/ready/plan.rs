@@ -208,6 +208,9 @@ impl Ready {
             // The board itself does it at that clock.
             TimedAction::Fan { speed, .. } => {
                 self.stream.kept.push_fan(clock, speed);
+                if !self.plans_job() {
+                    self.diary.input(Input::Fan(speed));
+                }
                 self.thermal.set_fan(speed, Some(clock), &mut self.board, now);
             }
             action => self.stream.schedule(clock, Due::Action(line, action)),
