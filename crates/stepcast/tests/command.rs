@@ -219,3 +219,31 @@ fn a_wrong_machine_file_is_said_by_line() {
     assert_eq!(output.status.code(), Some(1));
     assert!(stderr(&output).contains("/nowhere.cfg"), "{}", stderr(&output));
 }
+
+#[test]
+fn a_print_begins_with_a_line_or_a_layer() {
+    let second =
+        PRINT.replace("G1 E1.6 F2400\n", "G1 Z0.5 F600\nG1 X50 Y50 E3.4 F1800\nG1 X60 E3.9\nG1 E1.6 F2400\n");
+    let file = File::new("start.gcode", &second);
+    let (output, whole) = simulate(&file, &[]);
+    assert_eq!(output.status.code(), Some(0), "{whole:#}");
+    let moves = |report: &Value| report["moves"].as_u64().expect("a number");
+    for (arguments, least) in [(["--start-line", "11"], 7), (["--start-layer", "2"], 5)] {
+        let (output, report) = simulate(&file, &arguments);
+        assert_eq!((output.status.code(), &report["result"]), (Some(0), &"done".into()), "{report:#}");
+        // The way there is up, to the side, filament out and back, across, down.
+        assert!(moves(&report) >= least && report["pauses"] == 1, "{report:#}");
+        let error = report["path_error_max_mm"].as_f64();
+        assert!(error.is_some_and(|error| error < 0.02), "{report:#}");
+        let homed: Vec<&Value> =
+            report["homing"].as_array().expect("a list").iter().map(|homed| &homed["motor"]).collect();
+        assert_eq!(homed, ["stepper_z", "stepper_x", "stepper_y"]);
+    }
+    let (_, first) = simulate(&file, &["--start-layer", "1"]);
+    assert_eq!(first["pulse_digest"], whole["pulse_digest"]);
+    let (output, error) = simulate(&file, &["--start-layer", "9"]);
+    assert_eq!(output.status.code(), Some(1), "{error:#}");
+    assert!(error["reason"].as_str().is_some_and(|reason| reason.contains("2 layers")), "{error:#}");
+    let both = ["simulate", "a", "--config", "b", "--start-line", "3", "--start-layer", "2"];
+    assert_eq!(stepcast(&both).status.code(), Some(2));
+}

@@ -152,3 +152,27 @@ fn a_print_goes_on_above_what_it_had_made() {
         assert_eq!(homed, [0, 1]);
     }
 }
+
+/// By its own clock the host has made the rest of the queue long before it misses the board.
+#[test]
+fn a_print_is_over_only_when_the_board_has_lived_to_make_it() {
+    let file = squares(2);
+    let last = ages(&file).last().unwrap().1;
+    let bench = interrupted(&file, last - 0.5);
+    assert!(!Journal::read(bench.journal.as_bytes()).unwrap().has_ended);
+}
+
+#[test]
+fn what_is_switched_off_on_the_way_is_asked_about() {
+    let file = squares(2);
+    let mut bench = Setup::default().ready();
+    start(&mut bench, &file, 20);
+    bench.ask(Request::SetPosition { axis: 2, position: Mm(40.0) });
+    bench.ask(Request::Resume);
+    bench.until("homing", 60.0, |bench| bench.celsius(0) > 62.0);
+    // The user changes their mind: nothing is primed cold, and everything is off.
+    bench.ask(Request::Cancel);
+    bench.job_over();
+    assert!(bench.events.contains(&Event::JobCancelled));
+    bench.assert_all_off();
+}
