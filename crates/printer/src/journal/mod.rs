@@ -32,8 +32,10 @@ const FORMATS: core::ops::RangeInclusive<u32> = 1..=FORMAT;
 pub const PENDING_BYTES_MAX: usize = 1024 * 1024;
 /// The most bytes of a journal that are read: a print of weeks.
 pub const JOURNAL_BYTES_MAX: usize = 64 * 1024 * 1024;
-/// Progress is written no more often than this, and with no more delay than this: some 5 MB in a day of printing.
+/// Progress is written no more often than this, and with no more delay than this: some 5 MB in a day of printing …
 pub const PROGRESS_INTERVAL: Seconds = Seconds(1.0);
+/// … but for progress at another height, which is written sooner: 20 MB where it goes up and down all the time.
+pub const HEIGHT_INTERVAL: Seconds = Seconds(0.25);
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 

@@ -10,8 +10,8 @@ use super::{board::Board, job::JobOptions};
 use crate::{
     config::PrinterConfig,
     journal::{
-        Continuation, Dropped, FORMAT, HeaterName, Height, Input, MotorQueue, MovedBy, PROGRESS_INTERVAL,
-        Parked, Place, Record, RowPlace, Writer, machine_check,
+        Continuation, Dropped, FORMAT, HEIGHT_INTERVAL, HeaterName, Height, Input, MotorQueue, MovedBy,
+        PROGRESS_INTERVAL, Parked, Place, Record, RowPlace, Writer, machine_check,
     },
     machine::MOTORS,
     planner::{Planned, Planner},
@@ -40,11 +40,13 @@ struct Job {
     id: u32,
     told: Seconds,
     /// The last progress by this host's clock, which the board need not have lived to see …
-    seen: Option<(u32, Seconds)>,
+    seen: Option<Progress>,
     /// … that of a moment at which the board was heard of …
-    waiting: Option<((u32, Seconds), Seconds)>,
+    waiting: Option<(Progress, Seconds)>,
     /// … and that after which it was heard of again: it has not been written.
-    made: Option<(u32, Seconds)>,
+    made: Option<Progress>,
+    /// The height of the last that was written.
+    told_z: f64,
     /// What was last written of where Z stands.
     height: Option<Height>,
     /// The board counts since its drivers were powered up, as far as is known.
@@ -59,6 +61,16 @@ impl Job {
         self.id = self.id.wrapping_add(1).max(NO_JOB + 1);
         self.id
     }
+}
+
+/// The end of a line's move.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Progress {
+    pub(super) line: u32,
+    /// Print time.
+    pub(super) elapsed: Seconds,
+    /// In mm.
+    pub(super) z: f64,
 }
 
 impl Diary {
@@ -96,6 +108,7 @@ impl Diary {
             seen: None,
             waiting: None,
             made: None,
+            told_z: f64::NAN,
             height: None,
             since_power_up,
             is_parked: false,
@@ -120,6 +133,7 @@ impl Diary {
             seen: None,
             waiting: None,
             made: None,
+            told_z: f64::NAN,
             height,
             since_power_up,
             is_parked,
@@ -219,9 +233,9 @@ impl Diary {
     }
 
     /// By this host's clock, the print got to the end of a line's move.
-    pub(super) const fn progress(&mut self, line: u32, elapsed: Seconds) {
+    pub(super) const fn progress(&mut self, progress: Progress) {
         if let Some(job) = &mut self.job {
-            job.seen = Some((line, elapsed));
+            job.seen = Some(progress);
         }
     }
 
@@ -236,9 +250,14 @@ impl Diary {
         }
     }
 
-    /// Writes how far the print is, from time to time.
+    /// Writes how far the print is, from time to time, and soon after it has got to another height: whoever goes on below
+    /// what has been made already goes through it.
     pub(super) fn tell_progress(&mut self, now: Seconds) {
-        if self.job.as_ref().is_some_and(|job| now - job.told >= PROGRESS_INTERVAL) {
+        let is_due = |job: &Job| {
+            let is_new_height = job.made.is_some_and(|made| made.z != job.told_z);
+            now - job.told >= if is_new_height { HEIGHT_INTERVAL } else { PROGRESS_INTERVAL }
+        };
+        if self.job.as_ref().is_some_and(is_due) {
             self.tell_last(now);
         }
     }
@@ -246,8 +265,8 @@ impl Diary {
     /// Writes how far the print is: it may be the last that is heard of it.
     pub(super) fn tell_last(&mut self, now: Seconds) {
         let Some(job) = &mut self.job else { return };
-        if let Some((line, elapsed)) = job.made.take() {
-            job.told = now;
+        if let Some(Progress { line, elapsed, z }) = job.made.take() {
+            (job.told, job.told_z) = (now, z);
             self.writer.write(&Record::Progress { line, elapsed: elapsed.0 });
         }
     }

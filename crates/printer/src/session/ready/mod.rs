@@ -24,7 +24,7 @@ use super::{
     board::Board,
     connect,
     console::Console,
-    diary::Diary,
+    diary::{Diary, Progress},
     event::{Event, Events},
     inbox::{self, Message},
     job::{Job, JobStatus, PROGRESS_INTERVAL},
@@ -310,7 +310,7 @@ impl Ready {
             Due::MoveEnd(made) => {
                 let elapsed = self.stream.elapsed(made.end, &self.board);
                 if made.line > 0 && self.plans_job() {
-                    self.diary.progress(made.line, elapsed);
+                    self.diary.progress(Progress { line: made.line, elapsed, z: made.to[2] });
                 }
                 if let Some(job) =
                     self.job.as_mut().filter(|job| made.line > 0 && now - job.told >= PROGRESS_INTERVAL)

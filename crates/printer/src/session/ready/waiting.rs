@@ -266,16 +266,22 @@ impl Ready {
                 self.wait = Wait::Heater { heater, until: HeaterGoal::Between(minimum, maximum) };
             }
             Barrier::Dwell(pause) => self.wait = Wait::Dwell { until: now + pause },
+            Barrier::MotorsOff(_) if self.plans_job() && self.board.said_after < self.rested => {
+                // Where Z stands then is known only if the board has lived to make what comes before.
+                self.planner.put_barrier(Some((line, barrier.clone())));
+                self.wait = Wait::Word;
+            }
             Barrier::MotorsOff(motors) => {
                 if !self.plans_job() {
                     self.diary.lose_place(&mut self.board);
                 }
+                if motors[2] {
+                    // Without current it moves as it does without power, and its driver keeps its place.
+                    self.note_height(self.planner.position()[2], MovedBy::Nobody);
+                }
                 self.stream.disable(motors, &mut self.board, now);
                 for axis in (0..3).filter(|&axis| motors[axis]) {
                     self.planner.guard.set_homed(axis, false);
-                }
-                if motors[2] {
-                    self.note_height(self.planner.position()[2], MovedBy::Others);
                 }
             }
             Barrier::WaitForMoves => {}

@@ -30,7 +30,7 @@ const DETENTS_NM: [f64; 3] = [0.0, 0.02, 0.05];
 const SAG_PART: f64 = 0.25;
 const SAG_MM: f64 = 0.5;
 /// Whoever measures Z is off by up to so much, in mm: a sheet of paper.
-const MEASURED_MM: f64 = 0.05;
+const MEASURED_MM: f64 = 0.04;
 /// X and Y are as exact as they are homed: no faster than so, in mm/s.
 const SECOND_HOMING: MmPerS = MmPerS(5.0);
 /// In so many prints the host has the same power.
@@ -123,8 +123,8 @@ fn interrupted(
 
     let mut broken = gone_on.broken;
     let mut heights = Heights::default();
-    heights.follow(&before);
-    let (depth_mm, times) = heights.follow(&after);
+    heights.follow(&before, 0);
+    let (depth_mm, times) = heights.follow(&after, gone_on.found.reach_line);
     if times > 0 {
         broken.push(format!("the nozzle went through the part {times} times, {depth_mm:.3} mm deep"));
     }

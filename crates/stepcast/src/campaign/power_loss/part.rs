@@ -171,13 +171,15 @@ impl Heights {
     }
 
     /// Follows a way: what it lays becomes part of the part, and where it goes across it must not be inside. How deep it
-    /// was, and how often.
-    pub(super) fn follow(&mut self, way: &[(Sample, Doing)]) -> (f64, u64) {
+    /// was, and how often. Lines up to `twice` may have been made before, and something above them: where they are laid again
+    /// they are no way through the part.
+    pub(super) fn follow(&mut self, way: &[(Sample, Doing)], twice: u32) -> (f64, u64) {
         let (mut deepest, mut times) = (0.0_f64, 0);
         let mut last: Option<[f64; 3]> = None;
         for (sample, doing) in way {
             let place = sample.place;
-            if last.is_some_and(|last| last[..2] != place[..2]) {
+            let is_laid_again = matches!(*doing, Doing::Line { line, extrudes: true } if line <= twice);
+            if !is_laid_again && last.is_some_and(|last| last[..2] != place[..2]) {
                 let depth = self.depth(place);
                 deepest = deepest.max(depth);
                 times += u64::from(depth > TOUCH_MM);
@@ -259,15 +261,18 @@ mod tests {
     #[test]
     fn a_way_through_the_part_is_found_and_one_above_it_is_none() {
         let mut heights = Heights::default();
-        assert_eq!(heights.follow(&square(5.0, 0.0, 0)), (0.0, 0));
+        assert_eq!(heights.follow(&square(5.0, 0.0, 0), 0), (0.0, 0));
         // At the height of the layer it slides over it.
-        assert_eq!(heights.follow(&across(5.0)), (0.0, 0));
-        assert_eq!(heights.follow(&across(7.0)), (0.0, 0));
-        let (depth, times) = heights.follow(&across(4.9));
+        assert_eq!(heights.follow(&across(5.0), 99), (0.0, 0));
+        assert_eq!(heights.follow(&across(7.0), 99), (0.0, 0));
+        let (depth, times) = heights.follow(&across(4.9), 99);
         assert!((depth - 0.1).abs() < 1e-9 && times >= 2, "{depth} {times}");
+        // What is laid again may be below what was laid since, and nothing else.
+        assert_eq!(heights.follow(&square(4.8, 0.0, 0), 13).1, 0);
+        assert!(heights.follow(&square(4.8, 0.0, 0), 12).1 > 0);
         // Up and down is no way across.
         let hop: Vec<_> =
             [5.0, 4.0, 5.0].map(|z| (Sample { at: Ticks(0), place: [10.0, 20.0, z] }, Doing::Other)).to_vec();
-        assert_eq!(heights.follow(&hop).1, 0);
+        assert_eq!(heights.follow(&hop, 99).1, 0);
     }
 }
