@@ -139,7 +139,7 @@ impl Ready {
             Planned::Notice(diagnostic) => self.on_notice(diagnostic, now),
             Planned::NeedsInput => return Ok(self.on_drained(now)),
             Planned::EndOfSource if self.board.said_after < self.rested => {
-                self.wait = Wait::Word;
+                self.wait = Wait::Word(None);
                 return Ok(false);
             }
             Planned::EndOfSource => self.finish_job(now),

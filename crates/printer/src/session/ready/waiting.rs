@@ -22,7 +22,7 @@ use crate::{
 pub(super) enum Wait {
     Nothing,
     /// For a word of the board's that it has lived to make everything: by this host's clock it has.
-    Word,
+    Word(Option<Box<(LineNumber, Barrier)>>),
     /// Until a nozzle that may stick to the part comes free.
     Free,
     /// For all heaters, before a paused job goes back to where it was.
@@ -69,7 +69,7 @@ impl Wait {
         let held = match *self {
             Self::Heater { heater, until } => HeldWait::Heater { heater, until },
             Self::Dwell { until } => HeldWait::Dwell { rest: until - now },
-            Self::Nothing | Self::Word | Self::Free | Self::Heat | Self::Homing { .. } => {
+            Self::Nothing | Self::Word(_) | Self::Free | Self::Heat | Self::Homing { .. } => {
                 return HeldWait::Nothing;
             }
         };
@@ -102,9 +102,14 @@ impl Ready {
     pub(super) fn advance_wait(&mut self, now: Seconds) {
         match &mut self.wait {
             Wait::Nothing => {}
-            Wait::Word => {
+            Wait::Word(barrier) => {
                 if self.board.said_after >= self.rested {
+                    let barrier = barrier.take();
                     self.wait = Wait::Nothing;
+                    if let Some(barrier) = barrier {
+                        // It can end nothing: see where it is put there.
+                        drop(self.on_barrier(barrier.0, &barrier.1, now));
+                    }
                 }
             }
             Wait::Free => {
@@ -268,8 +273,7 @@ impl Ready {
             Barrier::Dwell(pause) => self.wait = Wait::Dwell { until: now + pause },
             Barrier::MotorsOff(_) if self.plans_job() && self.board.said_after < self.rested => {
                 // Where Z stands then is known only if the board has lived to make what comes before.
-                self.planner.put_barrier(Some((line, barrier.clone())));
-                self.wait = Wait::Word;
+                self.wait = Wait::Word(Some(Box::new((line, barrier.clone()))));
             }
             Barrier::MotorsOff(motors) => {
                 if !self.plans_job() {
