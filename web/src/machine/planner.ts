@@ -10,7 +10,7 @@ import initialise, { PrinterSession, read_journal, VirtualPrinter } from '../bin
 import { inWords, plannerTrouble } from '../planner_error';
 import { NO_LINE_ERRORS } from '../transport/transport';
 import { celsius, mm, type Seconds, seconds, share } from '../units';
-import type { Axis, ConfirmedLines, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
+import type { Axis, MachineEvent, PrintStart, Snapshot, Trouble, Wish } from './protocol';
 import type { JournalSummary, Session, SessionSnapshot, SimulatedPrinter } from './session';
 
 /** Speeds of moves by hand, mm/s; the machine's own limits hold besides. */
@@ -80,6 +80,8 @@ function toRequest(wish: Wish): UiRequest {
         distance_mm: wish.distance,
         speed_mm_s: JOG_SPEED[wish.axis],
       };
+    case 'set-position':
+      return { type: 'set-position', axis: lower(wish.axis), position_mm: wish.position };
     case 'extrude':
       return { type: 'extrude', length_mm: wish.length, speed_mm_s: wish.speed };
     case 'temperature':
@@ -198,13 +200,13 @@ class WasmSession implements Session {
     return refusal(() => this.#inner.request(JSON.stringify(toRequest(wish)), now));
   }
 
-  startJob(confirmedLines: ConfirmedLines, journal: number | null, now: Seconds): Trouble | null {
+  startJob({ confirmedLines, line }: PrintStart, journal: number | null, now: Seconds): Trouble | null {
     const isAll = confirmedLines === 'all';
     const request: JobRequest = {
       confirmed_lines: isAll ? [] : [...confirmedLines],
       confirm_all: isAll,
       journal,
-      start_line: null,
+      start_line: line,
     };
     return refusal(() => this.#inner.start_job(JSON.stringify(request), now));
   }

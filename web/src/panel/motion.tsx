@@ -3,11 +3,13 @@ import type { JSX } from 'preact';
 import type { Axis } from '../machine/protocol';
 import { isReady, snapshot, wish } from '../state/machine';
 import { change, EXTRUDE_MAX_MM, EXTRUDE_SPEED_MAX_MM_S, JOG_STEPS, settings } from '../state/settings';
+import { starting } from '../state/start';
 import { mm } from '../units';
 import { machineSummary } from './machine_summary';
 import { formatNumber } from './numbers';
 import { Button, Card, Choice, NumberField } from './parts';
 import { notFree } from './reasons';
+import { liftAndHome } from './start_steps';
 
 const AXES = ['X', 'Y', 'Z'] as const;
 
@@ -49,6 +51,21 @@ function Position(): JSX.Element | null {
   );
 }
 
+/** With a part on the bed Z cannot be homed. */
+function Home(): JSX.Element {
+  const isBeginning = starting.value !== null;
+  const why = isBeginning && !snapshot.value?.homed[2] ? 'Say first where Z is.' : null;
+  return (
+    <Button
+      icon="home"
+      class="jog centre"
+      label={isBeginning ? 'Lift and home X and Y' : 'Home all axes'}
+      why={notFree.value ?? why}
+      onClick={() => void (isBeginning ? liftAndHome() : wish({ kind: 'home', axes: [] }))}
+    />
+  );
+}
+
 function JogPad({ why }: { readonly why: string | null }): JSX.Element {
   const step = settings.value.jogStep;
   const homed = snapshot.value?.homed ?? [false, false, false];
@@ -73,13 +90,7 @@ function JogPad({ why }: { readonly why: string | null }): JSX.Element {
         <legend class="unseen">Move X and Y</legend>
         {button('Y', 1, 'up', 'Back', 'north')}
         {button('X', -1, 'left', 'Left', 'west')}
-        <Button
-          icon="home"
-          class="jog centre"
-          label="Home all axes"
-          why={notFree.value}
-          onClick={() => void wish({ kind: 'home', axes: [] })}
-        />
+        <Home />
         {button('X', 1, 'right', 'Right', 'east')}
         {button('Y', -1, 'down', 'Front', 'south')}
       </fieldset>
