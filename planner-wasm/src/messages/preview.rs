@@ -73,8 +73,6 @@ pub struct LayerSummary {
     pub first_vertex: u32,
     /// The nozzle's height at its first extrusion.
     pub z_mm: f64,
-    /// With this line a print of it can begin: the head is where its first extrusion begins. 0 without extrusion.
-    pub line: u32,
     /// Print time; 0 without a machine.
     pub time_s: f64,
 }
@@ -139,7 +137,6 @@ impl PreviewSummary {
         let layers = report.layers.iter().map(|layer| LayerSummary {
             first_vertex: layer.first_vertex,
             z_mm: layer.z.0,
-            line: layer.line,
             time_s: layer.time.0,
         });
         let features = report.features.iter().map(|feature| FeatureSummary {

@@ -14,10 +14,6 @@ first_vertex: number,
  */
 z_mm: Mm, 
 /**
- * With this line a print of it can begin: the head is where its first extrusion begins. 0 without extrusion.
- */
-line: number, 
-/**
  * Print time; 0 without a machine.
  */
 time_s: Seconds, };

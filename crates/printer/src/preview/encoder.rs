@@ -128,7 +128,6 @@ impl Encoder {
         let length = distance(from, to);
         if length < SAME_PLACE_MM {
             if filament != 0.0 {
-                self.layers.stay(mv.line.0);
                 self.end_wall();
                 let flag = if filament < 0.0 { Flags::RETRACT } else { Flags::UNRETRACT };
                 self.start_from(from, out);
@@ -141,7 +140,7 @@ impl Encoder {
         let extrudes = filament > 0.0;
         self.follow_wall(extrudes, from);
         self.start_from(from, out);
-        let layer = self.layers.segment(mv.line.0, self.count, extrudes, to[2]);
+        let layer = self.layers.segment(self.count, extrudes, to[2]);
         let mut flags = Flags::default();
         if !extrudes {
             flags = Flags::TRAVEL;

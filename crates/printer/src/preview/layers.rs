@@ -21,9 +21,6 @@ pub(super) struct Layer {
     pub(super) first_vertex: u32,
     /// The nozzle's height at its first extrusion.
     pub(super) z: Mm,
-    /// A print can begin with this line: the head has got to where the layer's first extrusion begins, and filament that
-    /// was pulled back on the way has yet to be pushed. 0 without extrusion.
-    pub(super) line: u32,
 }
 
 /// Tells layers apart.
@@ -39,26 +36,18 @@ pub(super) struct Layers {
     /// The present one has extrusion in it.
     extruded: bool,
     below_mm: f64,
-    /// The first line that moves anything since the head was last somewhere else, or laid filament.
-    arrived: Option<u32>,
 }
 
 impl Layers {
     pub(super) fn new() -> Self {
         Self {
-            list: vec![Layer { first_vertex: 0, z: Mm::ZERO, line: 0 }],
+            list: vec![Layer { first_vertex: 0, z: Mm::ZERO }],
             z_known: false,
             commented: false,
             announced: false,
             extruded: false,
             below_mm: 0.0,
-            arrived: None,
         }
-    }
-
-    /// Filament moves on the spot.
-    pub(super) fn stay(&mut self, line: u32) {
-        self.arrived.get_or_insert(line);
     }
 
     /// A comment says that a layer begins.
@@ -74,8 +63,8 @@ impl Layers {
         }
     }
 
-    /// A line's segment is about to end in the vertex of this number. Says which layer it is in.
-    pub(super) fn segment(&mut self, line: u32, next_vertex: u32, extrudes: bool, z_mm: f64) -> u32 {
+    /// A segment is about to end in the vertex of this number. Says which layer it is in.
+    pub(super) fn segment(&mut self, next_vertex: u32, extrudes: bool, z_mm: f64) -> u32 {
         let rises = !self.commented
             && extrudes
             && self.z_known
@@ -88,14 +77,12 @@ impl Layers {
         } else if rises {
             self.begin(next_vertex);
         }
-        let arrived = self.arrived.take().unwrap_or(line);
         if extrudes {
             self.extruded = true;
             if !self.z_known {
                 self.z_known = true;
                 if let Some(layer) = self.list.last_mut() {
                     layer.z = Mm(z_mm);
-                    layer.line = arrived;
                 }
             }
         }
@@ -105,14 +92,14 @@ impl Layers {
     fn begin(&mut self, next_vertex: u32) {
         if self.list.len() < LAYERS_MAX {
             self.below_mm = self.current().z.0;
-            self.list.push(Layer { first_vertex: next_vertex, z: self.current().z, line: 0 });
+            self.list.push(Layer { first_vertex: next_vertex, z: self.current().z });
             self.z_known = false;
             self.extruded = false;
         }
     }
 
     fn current(&self) -> Layer {
-        self.list.last().copied().unwrap_or(Layer { first_vertex: 0, z: Mm::ZERO, line: 0 })
+        self.list.last().copied().unwrap_or(Layer { first_vertex: 0, z: Mm::ZERO })
     }
 
     /// The present layer.

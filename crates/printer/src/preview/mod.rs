@@ -45,9 +45,6 @@ pub struct LayerReport {
     pub first_vertex: u32,
     /// The nozzle's height at its first extrusion.
     pub z: Mm,
-    /// A print can begin with this line: the head has got to where the layer's first extrusion begins, and filament that
-    /// was pulled back on the way has yet to be pushed. 0 without extrusion.
-    pub line: u32,
     /// Print time; 0 without a machine.
     pub time: Seconds,
 }
@@ -244,7 +241,6 @@ impl Preview {
         let layers = self.encoder.layers.list().iter().enumerate().map(|(number, layer)| LayerReport {
             first_vertex: layer.first_vertex,
             z: layer.z,
-            line: layer.line,
             time: Seconds(layer_s.get(number).copied().unwrap_or(0.0)),
         });
         PreviewReport {
