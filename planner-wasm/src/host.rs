@@ -271,6 +271,7 @@ impl Host {
                 elapsed_s: self.elapsed_s,
                 fed_bytes: self.fed_bytes as f64,
                 queued_least_s: self.queued_least.map(|time| time.0),
+                start: self.session.pending_start().map(Into::into),
             },
             queued_s: self.session.motion_queued(now).map(|time| time.0),
             speed_factor,

@@ -13,6 +13,7 @@ mod plan;
 mod preview;
 mod simulation;
 mod speed;
+mod survey;
 mod virtual_printer;
 
 use printer::{
@@ -25,6 +26,7 @@ use wasm_bindgen::prelude::{JsError, wasm_bindgen};
 pub use host::{Host, MOVE_NUMBERS};
 pub use simulation::Simulation;
 pub use speed::SPEED_PAIRS_MAX;
+pub use survey::Survey;
 
 use messages::{ConfigReport, ErrorMessage, FileKindReport, JournalView, json};
 

@@ -9,6 +9,7 @@ pub mod config;
 pub mod error;
 pub mod heater;
 pub mod identify;
+pub mod interruption;
 pub mod journal;
 pub mod link;
 pub mod machine;

@@ -29,7 +29,10 @@ impl<const OBJECTS: usize, const MOVES: usize> Core<OBJECTS, MOVES> {
                 return Err(ShutdownReason::NotConfigured);
             }
             Command::HeaterSet { oid, target, standby, standby_s } => {
+                let now = board.now();
+                self.look(now);
                 self.heaters.set(oid, Target { milli: target, standby, standby_s })?;
+                self.look(now);
             }
             Command::HeaterLease { alive } => {
                 let now = board.now();

@@ -1,6 +1,6 @@
 //! What a print's journal says, for those who ask whether to go on with it.
 
-use printer::journal::Journal;
+use printer::{interruption::Interruption, journal::Journal};
 use serde::Serialize;
 
 /// A journal, as far as it could be read.
@@ -33,6 +33,63 @@ impl JournalView {
             elapsed_s: elapsed.0,
             // A journal is not read beyond 64 MiB.
             readable_bytes: journal.bytes as u32,
+        }
+    }
+}
+
+/// Where a print was when it was interrupted, for those who go on with it from a line after its board has lost everything.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
+pub struct InterruptionView {
+    /// The line of the last move that is known to have been made, 0 where none is.
+    pub line: u32,
+    /// The line to begin with (`JobRequest.start_line`): nothing is left out, and some seconds may be made twice.
+    pub start_line: u32,
+    /// It has not got beyond this line.
+    pub reach_line: u32,
+    /// Print time at `line`.
+    pub elapsed_s: f64,
+    /// The layer of the line, counted from 1.
+    pub layer: u32,
+    /// That layer's height.
+    pub layer_z_mm: f64,
+    /// The line with which that layer begins.
+    pub layer_line: u32,
+    /// Where the lines have the nozzle at the end of `line`.
+    pub position_mm: [f64; 3],
+    /// The lowest and highest Z at which the power may have gone; `null` where Z was being moved by hand or homed.
+    pub z_range_mm: Option<[f64; 2]>,
+    /// Where Z can stand once its motor has current again, the likeliest first: one of them is to be claimed
+    /// (`set-position`). Empty where nothing can be said.
+    pub z_places_mm: Vec<f64>,
+    /// How far such places are apart: whoever has measured Z takes the nearest.
+    pub z_pitch_mm: f64,
+    /// How far off the right place is at most. Where there is none: how far from `z_range_mm` Z may stand.
+    pub z_error_mm: f64,
+    /// The factors that held, for `set-speed-factor` and `set-flow-factor`.
+    pub speed_factor: f64,
+    /// See `speed_factor`.
+    pub flow_factor: f64,
+}
+
+impl From<&Interruption> for InterruptionView {
+    fn from(found: &Interruption) -> Self {
+        let [speed_factor, flow_factor] = found.factors;
+        Self {
+            line: found.line,
+            start_line: found.start_line,
+            reach_line: found.reach_line,
+            elapsed_s: found.elapsed.0,
+            layer: found.layer,
+            layer_z_mm: found.layer_z.0,
+            layer_line: found.layer_line,
+            position_mm: found.position.map(|mm| mm.0),
+            z_range_mm: found.z_range.map(|range| range.map(|mm| mm.0)),
+            z_places_mm: found.standings.places.iter().map(|mm| mm.0).collect(),
+            z_pitch_mm: found.standings.pitch.0,
+            z_error_mm: found.standings.error.0,
+            speed_factor,
+            flow_factor,
         }
     }
 }

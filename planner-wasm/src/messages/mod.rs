@@ -17,12 +17,12 @@ mod virtual_state;
 pub use config::{ConfigFinding, ConfigReport, ConfigSeverity, HeaterSummary, MachineSummary};
 pub use error::ErrorMessage;
 pub use event::{HeaterName, PhaseLabel, UiEvent};
-pub use journal::JournalView;
+pub use journal::{InterruptionView, JournalView};
 pub use preview::{
     Blocking, FeatureSummary, FileKindReport, Finding, FindingSeverity, LayerSummary, PreviewSummary,
 };
 pub use request::{JobRequest, JogAxis, UiRequest};
-pub use snapshot::{BoardView, JobPhase, JobView, LinkView, Snapshot, TemperatureView};
+pub use snapshot::{BoardView, JobPhase, JobView, LinkView, Snapshot, StartView, TemperatureView};
 pub use virtual_state::{EndstopState, FanState, HeaterState, MotorState, VirtualState};
 
 /// A message as JSON. Nothing here can fail to be written: no maps with other keys than text, no foreign types.

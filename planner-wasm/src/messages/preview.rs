@@ -71,6 +71,9 @@ pub struct Blocking {
 pub struct LayerSummary {
     /// Its first vertex.
     pub first_vertex: u32,
+    /// Its first line, for `JobRequest.start_line`: a print that begins there makes the whole layer and nothing of those
+    /// before. 1 for the first layer.
+    pub first_line: u32,
     /// The nozzle's height at its first extrusion.
     pub z_mm: f64,
     /// Print time; 0 without a machine.
@@ -136,6 +139,7 @@ impl PreviewSummary {
         let check = report.check;
         let layers = report.layers.iter().map(|layer| LayerSummary {
             first_vertex: layer.first_vertex,
+            first_line: layer.first_line,
             z_mm: layer.z.0,
             time_s: layer.time.0,
         });

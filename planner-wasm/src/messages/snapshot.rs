@@ -1,6 +1,9 @@
 //! A session at a moment.
 
-use printer::{link::LinkStats, session::JobStatus};
+use printer::{
+    link::LinkStats,
+    session::{JobStatus, PendingStart},
+};
 use serde::Serialize;
 
 use super::{ErrorMessage, HeaterName, PhaseLabel};
@@ -112,6 +115,27 @@ pub struct JobView {
     /// The least motion that the board had since the print's start, while more of it was to come. `null` before there was
     /// any.
     pub queued_least_s: Option<f64>,
+    /// It was started with a line in the middle of its file, is paused before that, and waits for the user: Z has to be
+    /// known (`set-position`, or homed) before `resume`, which does everything else. `null` otherwise.
+    pub start: Option<StartView>,
+}
+
+/// How a job begins that does not begin with its file.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
+pub struct StartView {
+    /// The line with which it begins.
+    pub line: u32,
+    /// Where its lines have the head before it.
+    pub position_mm: [f64; 3],
+    /// The height over which the way there leads: above all that has been printed.
+    pub clear_z_mm: f64,
+}
+
+impl From<PendingStart> for StartView {
+    fn from(start: PendingStart) -> Self {
+        Self { line: start.line, position_mm: start.position, clear_z_mm: start.clear_z }
+    }
 }
 
 /// Counts of a link since the connection began.

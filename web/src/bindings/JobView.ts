@@ -1,5 +1,6 @@
 // Generated from planner-wasm/src/messages by `cargo xtask bindings`. Do not edit.
 import type { JobPhase } from './JobPhase';
+import type { StartView } from './StartView';
 import type { Bytes, Seconds } from './units';
 
 /**
@@ -26,4 +27,9 @@ fed_bytes: Bytes,
  * The least motion that the board had since the print's start, while more of it was to come. `null` before there was
  * any.
  */
-queued_least_s: Seconds | null, };
+queued_least_s: Seconds | null, 
+/**
+ * It was started with a line in the middle of its file, is paused before that, and waits for the user: Z has to be
+ * known (`set-position`, or homed) before `resume`, which does everything else. `null` otherwise.
+ */
+start: StartView | null, };

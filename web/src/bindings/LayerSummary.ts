@@ -10,6 +10,11 @@ export type LayerSummary = {
  */
 first_vertex: number, 
 /**
+ * Its first line, for `JobRequest.start_line`: a print that begins there makes the whole layer and nothing of those
+ * before. 1 for the first layer.
+ */
+first_line: number, 
+/**
  * The nozzle's height at its first extrusion.
  */
 z_mm: Mm, 

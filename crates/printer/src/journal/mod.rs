@@ -24,14 +24,16 @@ pub(crate) use self::{
 
 use crate::{config::PrinterConfig, machine::MOTORS, planner::Position};
 
-/// The format that is written, and the only one that is read.
-pub const FORMAT: u32 = 1;
+/// The format that is written.
+pub const FORMAT: u32 = 2;
+/// The formats that are read. The first does not say where Z's motor stands.
+const FORMATS: core::ops::RangeInclusive<u32> = 1..=FORMAT;
 /// The most bytes that wait for the owner. One that takes none keeps no journal.
 pub const PENDING_BYTES_MAX: usize = 1024 * 1024;
 /// The most bytes of a journal that are read: a print of weeks.
 pub const JOURNAL_BYTES_MAX: usize = 64 * 1024 * 1024;
-/// Progress is written no more often than this.
-pub const PROGRESS_INTERVAL: Seconds = Seconds(2.0);
+/// Progress is written no more often than this, and with no more delay than this: some 5 MB in a day of printing.
+pub const PROGRESS_INTERVAL: Seconds = Seconds(1.0);
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
@@ -144,8 +146,36 @@ pub enum Record {
         /// Print time in seconds.
         elapsed: f64,
     },
+    /// What is known of where the Z axis stands.
+    Height(Height),
     /// The print is over, one way or another.
     Ended,
+}
+
+/// What is known of where the Z axis stands: its position is one thing, how far its motor has been turned another.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Height {
+    /// At this position in mm …
+    pub z: f64,
+    /// … the board counted its motor here, in microsteps towards higher positions.
+    pub count: i32,
+    /// The board has counted since its drivers were powered up, as far as is known: from the count follows how they have
+    /// set the motor's coils.
+    pub since_power_up: bool,
+    /// Who moves it.
+    pub by: MovedBy,
+}
+
+/// Who moves the Z axis from a place of the journal on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MovedBy {
+    /// The lines of the file.
+    File,
+    /// Nobody: it rests there.
+    Nobody,
+    /// Something that is not in the journal: homing, or the user in a pause. Position and count are those before.
+    Others,
 }
 
 /// What distinguishes a machine from others, as far as a plan depends on it.
@@ -214,6 +244,8 @@ pub struct Journal {
     runs: Vec<CountedRun>,
     /// The line of the last move that was seen to be made, and the print time then.
     pub progress: Option<(u32, Seconds)>,
+    /// What was last known of where the Z axis stands.
+    pub height: Option<Height>,
     /// Whether the print is over.
     pub has_ended: bool,
     /// Bytes that could be read; what follows them was torn off or damaged.
@@ -264,7 +296,7 @@ impl Journal {
         else {
             return Err(JournalError::NoBegin);
         };
-        if format != FORMAT {
+        if !FORMATS.contains(&format) {
             return Err(JournalError::Format(format));
         }
         Ok(Self {
@@ -279,6 +311,7 @@ impl Journal {
             inputs: Vec::new(),
             runs: Vec::new(),
             progress: None,
+            height: None,
             has_ended: false,
             bytes: 0,
         })
@@ -290,9 +323,33 @@ impl Journal {
             Record::Continued { inputs } => self.inputs.truncate(inputs),
             Record::Run { id, run, start, from } => self.runs.push(CountedRun { id, run, start, from }),
             Record::Progress { line, elapsed } => self.progress = Some((line, Seconds(elapsed))),
+            Record::Height(height) => self.height = Some(height),
             // A second begin belongs to another print, which has no place in this journal.
             Record::Began { .. } | Record::Ended => self.has_ended = true,
         }
+    }
+
+    /// The speed and flow factors that the user set last, where they did.
+    pub fn factors(&self) -> [Option<f64>; 2] {
+        let mut factors = [None; 2];
+        for (_, input) in &self.inputs {
+            match *input {
+                Input::Speed(factor) => factors[0] = Some(factor),
+                Input::Flow(factor) => factors[1] = Some(factor),
+                Input::FinishRun | Input::Fan(_) | Input::Target(..) => {}
+            }
+        }
+        factors
+    }
+
+    /// Where the machine stood when the print began, where it began with its file.
+    pub(crate) fn began_at(&self) -> Option<Position> {
+        self.start_line.is_none().then_some(self.position)
+    }
+
+    /// Whether it was begun on this machine.
+    pub(crate) fn is_of(&self, config: &PrinterConfig) -> bool {
+        self.machine == machine_check(config)
     }
 
     /// Whether a board that counts under this number carries out this print.
@@ -370,9 +427,10 @@ mod tests {
     fn what_is_none_of_ours_is_refused() {
         let mut other = began();
         if let Record::Began { format, .. } = &mut other {
-            *format = 2;
+            *format = FORMAT + 1;
         }
-        assert_eq!(Journal::read(written(&[other]).as_bytes()), Err(JournalError::Format(2)));
+        let other = written(&[other]);
+        assert_eq!(Journal::read(other.as_bytes()), Err(JournalError::Format(FORMAT + 1)));
         for bytes in [&b""[..], b"\n", b"00000000 {}\n", written(&[Record::Ended]).as_bytes()] {
             assert_eq!(Journal::read(bytes), Err(JournalError::NoBegin));
         }

@@ -15,7 +15,7 @@ use units::{Celsius, Clock32, Seconds, Ticks};
 use wire::RowCheck;
 
 use super::{
-    CountedRun, Input, Journal, Place, RowPlace, machine_check,
+    CountedRun, Height, Input, Journal, Place, RowPlace, machine_check,
     rows::{BoardQueue, Row},
 };
 use crate::{
@@ -85,6 +85,8 @@ pub(crate) struct Continuation {
     pub(crate) elapsed: Seconds,
     /// The number under which the board last counted.
     pub(crate) id: u32,
+    /// What was last written of where Z stands.
+    pub(crate) height: Option<Height>,
 }
 
 /// How far a replay is.
@@ -121,6 +123,7 @@ pub(crate) struct Replay {
     elapsed: Seconds,
     /// The last number in the journal.
     last_id: u32,
+    height: Option<Height>,
     /// Reads up to the line with which the print begins.
     skip: Option<Skip>,
     is_done: bool,
@@ -178,6 +181,7 @@ impl Replay {
             fan: 0.0,
             elapsed: Seconds::ZERO,
             last_id: journal.runs.last().map_or(0, |run| run.id),
+            height: journal.height,
             skip: journal.start_line.map(|line| Skip::new(line, endstops)),
             is_done: false,
         })
@@ -284,6 +288,7 @@ impl Replay {
             fan: self.fan,
             elapsed: self.elapsed,
             id: self.last_id,
+            height: self.height,
         }
     }
 

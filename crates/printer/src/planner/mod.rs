@@ -24,6 +24,7 @@ pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
 pub use report::{MotorReport, PLAN_CLOCK, PlanReport, PlanStream};
 pub(crate) use skip::{Skip, Skipped};
+pub(crate) use source::Next;
 pub use source::{SOURCE_BYTES_MAX, Source};
 
 use crate::{

@@ -28,7 +28,7 @@ pub struct Source {
 
 /// What a source has next.
 #[derive(Debug)]
-pub(super) enum Next {
+pub(crate) enum Next {
     Action(Action),
     Diagnostic(Diagnostic),
     NeedsInput,
@@ -138,7 +138,7 @@ impl Source {
     }
 
     /// The next thing in the stream before a line; nothing once that line is the next.
-    pub(super) fn next_before(&mut self, until: LineNumber) -> Option<Next> {
+    pub(crate) fn next_before(&mut self, until: LineNumber) -> Option<Next> {
         loop {
             if let Some(diagnostic) = self.diagnostics.pop() {
                 return Some(Next::Diagnostic(diagnostic));

@@ -111,10 +111,10 @@ impl Encoder {
         self.tool = tool;
     }
 
-    pub(super) fn annotate(&mut self, annotation: &Annotation) {
+    pub(super) fn annotate(&mut self, line: u32, annotation: &Annotation) {
         match annotation {
             Annotation::Feature(feature) => self.feature = feature_number(*feature),
-            Annotation::LayerChange | Annotation::Layer(_) => self.layers.announce(),
+            Annotation::LayerChange | Annotation::Layer(_) => self.layers.announce(line),
             Annotation::Width(width) => self.width_mm = Some(width.0),
             Annotation::Height(height) => self.height_mm = Some(height.0),
             _ => {}
@@ -140,7 +140,7 @@ impl Encoder {
         let extrudes = filament > 0.0;
         self.follow_wall(extrudes, from);
         self.start_from(from, out);
-        let layer = self.layers.segment(self.count, extrudes, to[2]);
+        let layer = self.layers.segment(self.count, mv.line.0, extrudes, to[2]);
         let mut flags = Flags::default();
         if !extrudes {
             flags = Flags::TRAVEL;

@@ -6,14 +6,14 @@
 
 mod encoder;
 mod estimate;
-mod layers;
+pub(crate) mod layers;
 #[cfg(test)]
 mod tests;
 pub mod vertex;
 
 use std::collections::VecDeque;
 
-use gcode::{Action, Annotation, CHORD_TOLERANCE, Chords, Move};
+use gcode::{Action, Annotation, CHORD_TOLERANCE, Chords, LineNumber, Move};
 use units::{Mm, Seconds};
 
 use self::{
@@ -43,6 +43,8 @@ const FILAMENT_AREA_MM2: f64 = core::f64::consts::PI * 1.75 * 1.75 / 4.0;
 pub struct LayerReport {
     /// Its first vertex.
     pub first_vertex: u32,
+    /// Its first line: a print that begins there makes the whole layer and nothing of those before.
+    pub first_line: u32,
     /// The nozzle's height at its first extrusion.
     pub z: Mm,
     /// Print time; 0 without a machine.
@@ -94,7 +96,7 @@ pub struct Preview {
     input: Vec<u8>,
     /// How much of `input` has been read.
     taken: usize,
-    actions: VecDeque<Action>,
+    actions: VecDeque<(Action, LineNumber)>,
     arc: Option<Chords>,
     read_bytes: u64,
     ended: bool,
@@ -171,13 +173,13 @@ impl Preview {
                 continue;
             }
             self.arc = None;
-            if let Some(action) = self.actions.pop_front() {
-                self.act(action, out);
+            if let Some((action, line)) = self.actions.pop_front() {
+                self.act(action, line, out);
             } else if self.taken < self.input.len() {
                 self.read_piece();
             } else if self.ended && !self.finished {
                 self.finished = true;
-                self.checker.end_with(|action, _| self.actions.push_back(action));
+                self.checker.end_with(|action, line| self.actions.push_back((action, line)));
             } else {
                 if self.finished {
                     self.encoder.finish(out);
@@ -190,12 +192,12 @@ impl Preview {
     fn read_piece(&mut self) {
         let end = self.input.len().min(self.taken + PIECE_BYTES);
         let piece = &self.input[self.taken..end];
-        self.checker.feed_with(piece, |action, _| self.actions.push_back(action));
+        self.checker.feed_with(piece, |action, line| self.actions.push_back((action, line)));
         self.read_bytes += piece.len() as u64;
         self.taken = end;
     }
 
-    fn act(&mut self, action: Action, out: &mut Vec<u32>) {
+    fn act(&mut self, action: Action, line: LineNumber, out: &mut Vec<u32>) {
         if let Some(estimate) = &mut self.estimate {
             estimate.act(&action);
             self.checker.add(estimate.too_fast.take());
@@ -207,7 +209,7 @@ impl Preview {
             Action::SelectTool(tool) => self.encoder.select_tool(tool),
             Action::Annotation(Annotation::EstimatedTime(time)) => self.slicer_time = Some(time),
             Action::Annotation(Annotation::Generator(name)) => self.generator = Some(name),
-            Action::Annotation(annotation) => self.encoder.annotate(&annotation),
+            Action::Annotation(annotation) => self.encoder.annotate(line.0, &annotation),
             _ => {}
         }
     }
@@ -240,6 +242,7 @@ impl Preview {
         let in_features: f64 = features.iter().map(|feature| feature.time.0).sum();
         let layers = self.encoder.layers.list().iter().enumerate().map(|(number, layer)| LayerReport {
             first_vertex: layer.first_vertex,
+            first_line: layer.first_line,
             z: layer.z,
             time: Seconds(layer_s.get(number).copied().unwrap_or(0.0)),
         });

@@ -7,7 +7,7 @@ use wire::{Command, dictionary::Dictionary};
 
 use super::{
     layout::Layout,
-    motion_time::{MotionReport, MotionTime},
+    motion_time::{Heard, MotionReport, MotionTime},
 };
 use crate::{
     clock_sync::ClockSync,
@@ -45,6 +45,10 @@ pub(super) struct Board {
     pub(super) losses: Losses,
     /// The clock of steps.
     pub(super) motion: MotionTime,
+    /// It has started with its power, as far as is known: nobody has had it start anew.
+    pub(super) since_power_up: bool,
+    /// What arrives now was said after this: the board answered what was sent then.
+    pub(super) said_after: Seconds,
 }
 
 /// When the link last had to send something again.
@@ -78,8 +82,12 @@ impl Board {
 
     /// Takes the board's word on its motion clock; its hardware clock then, if that can be.
     pub(super) fn on_motion(&mut self, report: &MotionReport, now: Seconds) -> Option<Ticks> {
-        let slack = self.ticks(REPORT_SLACK);
-        self.motion.report(report, self.clock_at(now), slack)
+        let heard = Heard {
+            clock_now: self.clock_at(now),
+            said_after: self.clock_at(self.said_after),
+            slack: self.ticks(REPORT_SLACK),
+        };
+        self.motion.report(report, heard)
     }
 
     /// A duration in ticks of the nominal clock: what every plan is made in.
@@ -188,6 +196,17 @@ impl Board {
         link.set_board(profile.clock, 1000);
         let losses = Losses::default();
         let motion = MotionTime::default();
-        Self { link, dictionary, sync, clock: profile.clock, adc_max: 4095.0, layout, losses, motion }
+        Self {
+            link,
+            dictionary,
+            sync,
+            clock: profile.clock,
+            adc_max: 4095.0,
+            layout,
+            losses,
+            motion,
+            since_power_up: true,
+            said_after: Seconds(f64::NEG_INFINITY),
+        }
     }
 }

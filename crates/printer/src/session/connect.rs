@@ -197,6 +197,7 @@ impl Connecting {
         link: Link,
         dictionary: Dictionary,
         config: &PrinterConfig,
+        since_power_up: bool,
     ) -> Result<(Self, Event), PrinterError> {
         let wrong = |detail: &str| PrinterError::new(ErrorCode::DictionaryIncomplete, detail);
         let clock_freq =
@@ -228,6 +229,8 @@ impl Connecting {
             layout,
             losses: Losses::default(),
             motion: MotionTime::default(),
+            since_power_up,
+            said_after: Seconds(f64::NEG_INFINITY),
         };
         if let Some(window) = window {
             board.link.set_receive_window(window as usize);

@@ -10,8 +10,8 @@ use super::{board::Board, job::JobOptions};
 use crate::{
     config::PrinterConfig,
     journal::{
-        Continuation, FORMAT, HeaterName, Input, PROGRESS_INTERVAL, Place, Record, RowPlace, Writer,
-        machine_check,
+        Continuation, FORMAT, HeaterName, Height, Input, MovedBy, PROGRESS_INTERVAL, Place, Record, RowPlace,
+        Writer, machine_check,
     },
     machine::MOTORS,
     planner::{Planned, Planner},
@@ -19,6 +19,8 @@ use crate::{
 
 /// The number under which the board counts what is in no journal.
 const NO_JOB: u32 = 0;
+/// Position and count of an axis agree to so many microsteps: both are rounded.
+const ROUNDING_STEPS: f64 = 1.5;
 
 /// See the module.
 #[derive(Debug, Default)]
@@ -35,6 +37,12 @@ struct Job {
     /// The number under which the board counts.
     id: u32,
     told: Seconds,
+    /// Progress that has not been written.
+    progress: Option<(u32, Seconds)>,
+    /// What was last written of where Z stands.
+    height: Option<Height>,
+    /// The board counts since its drivers were powered up, as far as is known.
+    since_power_up: bool,
 }
 
 impl Diary {
@@ -49,6 +57,7 @@ impl Diary {
         options: &JobOptions,
         config: &PrinterConfig,
         planner: &Planner,
+        since_power_up: bool,
         now: Seconds,
     ) {
         let Some(print) = options.journal else { return };
@@ -63,7 +72,15 @@ impl Diary {
             confirm_all: options.confirm_all,
             start_line: options.start_line.filter(|&line| line > 1),
         });
-        self.job = Some(Job { place: Place::default(), runs: 0, id: print, told: now });
+        self.job = Some(Job {
+            place: Place::default(),
+            runs: 0,
+            id: print,
+            told: now,
+            progress: None,
+            height: None,
+            since_power_up,
+        });
     }
 
     /// A job is taken up again.
@@ -73,7 +90,9 @@ impl Diary {
         for &input in &taken.adopted {
             self.writer.write(&Record::Input { at: place, input });
         }
-        self.job = Some(Job { place, runs, id, told: now });
+        let height = taken.height;
+        let since_power_up = height.is_some_and(|height| height.since_power_up);
+        self.job = Some(Job { place, runs, id, told: now, progress: None, height, since_power_up });
     }
 
     /// The job is over, at rest: the board holds nothing any more that could be gone on with.
@@ -135,9 +154,47 @@ impl Diary {
     }
 
     /// The print got to the end of a line's move.
-    pub(super) fn progress(&mut self, line: u32, elapsed: Seconds, now: Seconds) {
-        let Some(job) = self.job.as_mut().filter(|job| now - job.told >= PROGRESS_INTERVAL) else { return };
-        job.told = now;
-        self.writer.write(&Record::Progress { line, elapsed: elapsed.0 });
+    pub(super) const fn progress(&mut self, line: u32, elapsed: Seconds) {
+        if let Some(job) = &mut self.job {
+            job.progress = Some((line, elapsed));
+        }
+    }
+
+    /// Writes how far the print is, from time to time.
+    pub(super) fn tell_progress(&mut self, now: Seconds) {
+        if self.job.as_ref().is_some_and(|job| now - job.told >= PROGRESS_INTERVAL) {
+            self.tell_last(now);
+        }
+    }
+
+    /// Writes how far the print is: it may be the last that is heard of it.
+    pub(super) fn tell_last(&mut self, now: Seconds) {
+        let Some(job) = &mut self.job else { return };
+        if let Some((line, elapsed)) = job.progress.take() {
+            job.told = now;
+            self.writer.write(&Record::Progress { line, elapsed: elapsed.0 });
+        }
+    }
+
+    /// The Z axis is at a position in mm where its motor's count is `count`, in microsteps of `step_mm` towards higher
+    /// positions. Written where it says something new.
+    pub(super) fn height(&mut self, z: f64, count: i32, by: MovedBy, step_mm: f64) {
+        let Some(job) = &mut self.job else { return };
+        let is_known = |told: &Height| {
+            let turned = f64::from(count.wrapping_sub(told.count));
+            let agrees = ((z - told.z) / step_mm - turned).abs() <= ROUNDING_STEPS;
+            told.by == by && agrees && (by == MovedBy::File || count == told.count)
+        };
+        if !job.height.as_ref().is_some_and(is_known) {
+            let height = Height { z, count, since_power_up: job.since_power_up, by };
+            job.height = Some(height);
+            self.writer.write(&Record::Height(height));
+        }
+    }
+
+    /// Whether Z is where something has moved it that is not in the journal.
+    pub(super) fn is_z_moved_by_others(&self) -> bool {
+        let height = self.job.as_ref().and_then(|job| job.height);
+        height.is_some_and(|height| height.by == MovedBy::Others)
     }
 }

@@ -30,6 +30,17 @@ pub struct JobOptions {
     pub start_line: Option<u32>,
 }
 
+/// A job that begins in the middle of its file, and waits for the user.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PendingStart {
+    /// The line with which it begins.
+    pub line: u32,
+    /// Where its lines have the head before it: X, Y, Z in mm.
+    pub position: [f64; 3],
+    /// The height over which the way there leads, in mm.
+    pub clear_z: f64,
+}
+
 /// What a job is doing.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum JobState {
@@ -83,6 +94,8 @@ pub(super) struct Paused {
 /// How a job begins that does not begin with its file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
+    /// The line with which it begins.
+    pub(super) line: u32,
     /// Ways lead over what has been printed at this height, in mm.
     pub(super) clear_z: f64,
     pub(super) fan: f64,

@@ -98,11 +98,12 @@ impl Lease {
 
     /// The board says nothing of its motion for too long: asks it. Whether that is so.
     pub(super) fn is_in_doubt(&mut self, board: &mut Board, now: Seconds) -> bool {
-        let silence = board.clock_at(now).saturating_sub(board.motion.known_until());
+        let clock_now = board.clock_at(now);
+        let silence = clock_now.saturating_sub(board.motion.known_until());
         if self.told.is_none() || silence < board.ticks(SILENCE_MAX) {
             return false;
         }
-        board.motion.doubt();
+        board.motion.doubt(clock_now);
         if now - self.asked >= ASK_AGAIN {
             self.asked = now;
             board.control(&Command::MotionGetState {});

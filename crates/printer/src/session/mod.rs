@@ -33,7 +33,7 @@ use wire::Command;
 
 pub use console::CONSOLE_BYTES_MAX;
 pub use event::{EVENTS_MAX, Event, PhaseName, Request, ScheduledMove, SpeedProfile};
-pub use job::{JobOptions, JobStatus};
+pub use job::{JobOptions, JobStatus, PendingStart};
 
 use self::{
     attach::Holding,
@@ -79,6 +79,8 @@ pub struct Session {
     restarts_left: u32,
     /// … and whether its owner asked for one, which also ends a shutdown.
     restart_wanted: bool,
+    /// The board was told to start anew, which its drivers do not notice.
+    has_restarted: bool,
     /// Bytes that are still to be sent to a board that restarts.
     parting: Vec<u8>,
     /// What is to be added to the job's journal.
@@ -99,6 +101,7 @@ impl Session {
             error: None,
             restarts_left: RESTARTS_MAX,
             restart_wanted: false,
+            has_restarted: false,
             parting: Vec::new(),
             journal: String::new(),
         }
@@ -185,7 +188,12 @@ impl Session {
                 Ok(None) => {}
                 Ok(Some(dictionary)) => {
                     let Stage::Identifying(identifying) = self.take_stage() else { return };
-                    match Connecting::new(identifying.into_link(), dictionary, &self.config) {
+                    match Connecting::new(
+                        identifying.into_link(),
+                        dictionary,
+                        &self.config,
+                        !self.has_restarted,
+                    ) {
                         Ok((connecting, identified)) => {
                             self.enter(Stage::Connecting(Box::new(connecting)));
                             self.events.push(identified);
@@ -220,6 +228,9 @@ impl Session {
     }
 
     fn on_failure(&mut self, failure: Failure, now: Seconds) {
+        if let Stage::Ready(ready) = &mut self.stage {
+            ready.diary.tell_last(now);
+        }
         let mut board = match self.take_stage() {
             Stage::Ready(ready) => ready.board,
             Stage::Holding(holding) => holding.board,
@@ -379,6 +390,7 @@ impl Session {
     fn restart(&mut self, board: Option<Board>, now: Seconds) {
         if let Some(mut board) = board {
             self.restarts_left = self.restarts_left.saturating_sub(1);
+            self.has_restarted = true;
             self.part(&mut board, &Command::Reset {}, now);
         }
         self.error = None;

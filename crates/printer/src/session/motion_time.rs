@@ -5,11 +5,16 @@
 //! while there is a lease; in a ramp there is none, and nothing new may be started. A board without a motion clock
 //! never tells, and the lag stays zero.
 //!
+//! After a long silence 32 bits are little: what the board said meanwhile may have waited on the line, and both clocks may
+//! have gone round unseen. Then only what was certainly said since counts.
+//!
 //! Knows no board and no lease. Clocks in ticks, 64 bits: those of the motion clock are the host's own continuation of
 //! the 32 bits on the wire.
 
 use units::{Clock32, Ticks};
 
+/// After a silence of this many ticks, what arrives may have been said at any time in it.
+const SILENCE_LONG: Ticks = Ticks(1 << 30);
 /// The full rate on the wire.
 const RATE_ONE: u16 = 4096;
 
@@ -77,8 +82,19 @@ pub(super) struct MotionTime {
     motion: Ticks,
     rate: u16,
     state: MotionState,
-    /// The board may have done anything since: nothing is claimed beyond what is known.
-    in_doubt: bool,
+    /// Since this hardware clock nothing is claimed beyond what is known: the board may have done anything.
+    in_doubt: Option<Ticks>,
+}
+
+/// When a report came.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Heard {
+    /// The hardware clock, about.
+    pub(super) clock_now: Ticks,
+    /// It was said after this.
+    pub(super) said_after: Ticks,
+    /// How far off `clock_now` may be.
+    pub(super) slack: Ticks,
 }
 
 impl Default for MotionTime {
@@ -88,7 +104,7 @@ impl Default for MotionTime {
             motion: Ticks(0),
             rate: RATE_ONE,
             state: MotionState::Running,
-            in_doubt: false,
+            in_doubt: None,
         }
     }
 }
@@ -97,7 +113,7 @@ impl MotionTime {
     /// The motion clock at a hardware clock; never beyond what it can be. While it slows, no more is claimed than was told:
     /// what it was told to run at, it runs at no longer.
     pub(super) fn at(&self, clock: Ticks) -> Ticks {
-        if self.in_doubt {
+        if self.in_doubt.is_some() {
             return self.motion;
         }
         let since = clock.0 as i64 - self.clock.0 as i64;
@@ -122,12 +138,12 @@ impl MotionTime {
 
     /// Whether motion is at rest, wherever on its path.
     pub(super) const fn is_held(&self) -> bool {
-        !self.in_doubt && matches!(self.state, MotionState::Held)
+        self.in_doubt.is_none() && matches!(self.state, MotionState::Held)
     }
 
     /// Whether the two clocks are a fixed lag apart.
     pub(super) const fn is_steady(&self) -> bool {
-        !self.in_doubt && matches!(self.state, MotionState::Running) && self.rate == RATE_ONE
+        self.in_doubt.is_none() && matches!(self.state, MotionState::Running) && self.rate == RATE_ONE
     }
 
     /// The clock up to which the board's word is known.
@@ -143,23 +159,41 @@ impl MotionTime {
         }
     }
 
-    /// The board has not been heard of for too long: whether motion goes on is not known.
-    pub(super) const fn doubt(&mut self) {
-        self.in_doubt = true;
+    /// The board has not been heard of for too long, as is found at `clock_now`: whether motion goes on is not known.
+    pub(super) fn doubt(&mut self, clock_now: Ticks) {
+        self.in_doubt.get_or_insert(clock_now);
     }
 
-    /// Takes the board's word. `clock_now` is about when; gives the report's clock, or nothing for one that cannot be.
-    pub(super) fn report(&mut self, report: &MotionReport, clock_now: Ticks, slack: Ticks) -> Option<Ticks> {
+    /// Takes the board's word; gives the report's clock, or nothing for one that cannot be, or may be old.
+    pub(super) fn report(&mut self, report: &MotionReport, heard: Heard) -> Option<Ticks> {
+        let Heard { clock_now, said_after, slack } = heard;
+        let is_stale = |doubted: Ticks| doubted > self.clock + SILENCE_LONG && said_after < doubted;
+        if self.in_doubt.is_some_and(is_stale) {
+            return None;
+        }
         let clock = clock_now.nearest(report.clock);
         if clock > clock_now + slack {
             return None;
         }
-        self.motion = self.at(clock).nearest(report.motion);
+        self.motion = self.about(report, clock).nearest(report.motion);
         self.clock = clock;
         self.rate = report.rate;
         self.state = report.state;
-        self.in_doubt = false;
+        self.in_doubt = None;
         Some(clock)
+    }
+
+    /// About where the motion clock is. Only a host ends a hold, so motion that runs after a silence has run all along;
+    /// what is held by then was so soon after the last renewal of the lease.
+    fn about(&self, report: &MotionReport, clock: Ticks) -> Ticks {
+        match (self.in_doubt, report.state) {
+            (None, _) => self.at(clock),
+            (Some(_), MotionState::Running) => {
+                let since = clock.saturating_sub(self.clock).0;
+                self.motion + Ticks(since / u64::from(RATE_ONE) * u64::from(report.rate.min(RATE_ONE)))
+            }
+            (Some(_), _) => self.motion,
+        }
     }
 }
 
@@ -167,7 +201,9 @@ impl MotionTime {
 mod tests {
     use super::*;
 
-    const SLACK: Ticks = Ticks(100);
+    const fn heard(clock_now: u64) -> Heard {
+        Heard { clock_now: Ticks(clock_now), said_after: Ticks(0), slack: Ticks(100) }
+    }
 
     #[test]
     fn without_a_word_of_the_board_the_clocks_are_one() {
@@ -183,7 +219,7 @@ mod tests {
         let start = (7 << 32) - 50;
         let mut report = |clock: u64, motion: u64, rate, state| {
             let report = MotionReport::new(clock as u32, motion as u32, rate, state, 2);
-            assert_eq!(time.report(&report, Ticks(clock + 10), SLACK), Some(Ticks(clock)));
+            assert_eq!(time.report(&report, heard(clock + 10)), Some(Ticks(clock)));
             time
         };
         report(start, start, 4096, 0);
@@ -204,12 +240,31 @@ mod tests {
     fn in_doubt_nothing_is_claimed_until_the_board_says_more() {
         let mut time = MotionTime::default();
         time.trust(Ticks(1000));
-        time.doubt();
+        time.doubt(Ticks(4000));
         assert_eq!((time.at(Ticks(5000)), time.is_steady()), (Ticks(1000), false));
         let report = MotionReport::new(5000, 5000, 4096, 0, 0);
         // From the future: not a word of this board's.
-        assert_eq!(time.report(&report, Ticks(1000), SLACK), None);
-        assert_eq!(time.report(&report, Ticks(5001), SLACK), Some(Ticks(5000)));
+        assert_eq!(time.report(&report, heard(1000)), None);
+        assert_eq!(time.report(&report, heard(5001)), Some(Ticks(5000)));
         assert_eq!(time.at(Ticks(6000)), Ticks(6000));
+    }
+
+    #[test]
+    fn after_a_long_silence_only_what_was_said_since_counts() {
+        let silent: u64 = 3 << 32;
+        for (motion, state, rate, expected) in
+            [(silent + 500, 0, 4096, silent + 500), (1700, 2, 0, 1700), (1700, 1, 2000, 1700)]
+        {
+            let mut time = MotionTime::default();
+            time.trust(Ticks(1000));
+            time.doubt(Ticks(silent));
+            // It was on the line all the while, and its clock might be one of just now.
+            let old = MotionReport::new(silent as u32 + 400, 1250, 4096, 0, 0);
+            assert_eq!(time.report(&old, heard(silent + 450)), None);
+            let new = MotionReport::new(silent as u32 + 500, motion as u32, rate, state, 2);
+            let since = Heard { said_after: Ticks(silent + 100), ..heard(silent + 600) };
+            assert_eq!(time.report(&new, since), Some(Ticks(silent + 500)));
+            assert_eq!(time.at(Ticks(silent + 500)), Ticks(expected));
+        }
     }
 }

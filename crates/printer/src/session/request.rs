@@ -7,12 +7,12 @@ use super::{
     Session, Stage,
     console::Console,
     event::Request,
-    job::{Job, JobOptions, JobState, JobStatus},
+    job::{Job, JobOptions, JobState, JobStatus, PendingStart, Start},
     ready::{Failure, Ready},
 };
 use crate::{
     error::{Ended, ErrorCode, PrinterError},
-    journal::Input,
+    journal::{Input, MovedBy},
     machine,
     planner::Position,
 };
@@ -107,7 +107,8 @@ impl Session {
             Some(line) if line > 1 => ready.begin_at(&mut job, line)?,
             _ => ready.planner.begin_job(&mut job.source),
         }
-        ready.diary.begin(&job.options, &ready.config, &ready.planner, now);
+        let since_power_up = ready.board.since_power_up;
+        ready.diary.begin(&job.options, &ready.config, &ready.planner, since_power_up, now);
         ready.last_active = now;
         ready.stream.reset_elapsed();
         job.told = now;
@@ -166,6 +167,16 @@ impl Session {
             Stage::Ready(ready) => ready.job_status(),
             _ => JobStatus::None,
         }
+    }
+
+    /// How the job begins that is paused before its first line, which is not that of its file.
+    pub fn pending_start(&self) -> Option<PendingStart> {
+        let Stage::Ready(ready) = &self.stage else { return None };
+        let job = ready.job.as_ref().filter(|job| job.status() == JobStatus::Paused)?;
+        let paused = job.paused.as_ref()?;
+        let Start { line, clear_z, .. } = paused.start?;
+        let [x, y, z, _] = paused.position;
+        Some(PendingStart { line, position: [x, y, z], clear_z })
     }
 
     /// How much motion the board has received and not yet made, in seconds. `None` where no run of motion is being
@@ -236,6 +247,7 @@ impl Ready {
         }
         self.diary.other_run(&mut self.board);
         self.planner.set_axis(axis, position.0, true);
+        self.note_height(self.planner.position()[2], MovedBy::Others);
         self.planner.correct(&mut self.console.source);
         Ok(())
     }

@@ -312,6 +312,11 @@ impl MotionStream {
         self.counts[motor] = count;
     }
 
+    /// Where the board counts a motor to be once all of its steps have been made.
+    pub(super) const fn count(&self, motor: usize) -> i32 {
+        self.counts[motor]
+    }
+
     /// Where the machine stands, in mm, from where the board counts its motors to be: the present run was broken off.
     pub(super) fn position_of(
         &self,

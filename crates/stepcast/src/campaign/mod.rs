@@ -58,6 +58,8 @@ const FAST_PART: f64 = 0.4;
 const STANDBY: Seconds = Seconds(10.0);
 /// The machine is watched for so long after its host is gone: until it is at stand-by, and that is over.
 const WATCHED: Seconds = Seconds(18.0);
+/// The longest window with the longest fault takes less than half of this.
+const TIME_MAX: Seconds = Seconds(3600.0);
 /// The number of the print in its journal.
 const JOURNAL: u32 = 1;
 /// After a clean print there is nothing to be seen.
@@ -224,6 +226,7 @@ impl Campaign {
                 journal_part,
             }),
             watched,
+            time_max: Some(TIME_MAX),
             quiet: true,
         };
         let input = || Input::memory(&window.name, window.gcode.clone());

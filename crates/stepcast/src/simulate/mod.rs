@@ -58,6 +58,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
         host_dies: None,
         successor: None,
         watched: run::AFTER,
+        time_max: None,
         quiet: false,
     };
     let mut simulation = Simulation::new(setup, Input::open(&args.file)?, Input::open(&args.file)?)?;

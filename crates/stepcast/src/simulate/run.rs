@@ -99,6 +99,8 @@ pub(crate) struct Setup {
     pub(crate) successor: Option<Successor>,
     /// The machine is watched for so long after the end.
     pub(crate) watched: Seconds,
+    /// A print that has not ended after so long is given up as failed.
+    pub(crate) time_max: Option<Seconds>,
     /// Nothing is shown on the terminal.
     pub(crate) quiet: bool,
 }
@@ -160,6 +162,9 @@ pub(crate) struct Simulation {
     stalls: Vec<(Ticks, Ticks)>,
     stage: Stage,
     watched: Seconds,
+    time_max: Option<Seconds>,
+    /// It has been given up for taking longer.
+    is_overdue: bool,
     quiet: bool,
     /// The temperatures at which heaters are safe without a host.
     standby: [(&'static str, Celsius); 2],
@@ -185,6 +190,7 @@ impl Simulation {
             host_dies,
             successor,
             watched,
+            time_max,
             quiet,
         } = setup;
         let board = demo_machine::fit(&mut config, board.as_ref())?;
@@ -218,6 +224,8 @@ impl Simulation {
             stalls: stalls(&faults.host_stalls, start, host_hz),
             stage: Stage::Connecting,
             watched,
+            time_max,
+            is_overdue: false,
             quiet,
             standby,
             lease: LeaseTap::default(),
@@ -249,6 +257,7 @@ impl Simulation {
                 break;
             }
             self.check_stall()?;
+            self.give_up_late();
             let now = self.printer.now();
             let earliest = now + self.ticks(WAKE_MIN);
             let until = self.clock.ticks_at(wake).max(earliest).min(self.next_sample.max(earliest));
@@ -453,6 +462,14 @@ impl Simulation {
         Ok(())
     }
 
+    fn give_up_late(&mut self) {
+        let is_late = self.time_max.is_some_and(|max| self.virtual_time() > max);
+        if is_late && !matches!(self.stage, Stage::Watching(_)) {
+            self.is_overdue = true;
+            self.end();
+        }
+    }
+
     fn ticks(&self, duration: Seconds) -> Ticks {
         self.printer.profile().clock.ticks_in(duration)
     }
@@ -499,7 +516,8 @@ impl Simulation {
             shutdown: state.shutdown.map(|reason| reason.text().to_owned()),
         };
         let motors = motors(&self.observer, tally, &state);
-        let error = self.observer.session_error().or_else(|| {
+        let overdue = self.is_overdue.then(|| own_error("no-end", "it was given up: it did not end in time"));
+        let error = overdue.or_else(|| self.observer.session_error()).or_else(|| {
             wrong(&self.observer, tally, &motors, self.path_error_max_mm)
                 .map(|found| own_error("wrong-pulses", found))
         });

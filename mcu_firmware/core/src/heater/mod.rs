@@ -41,6 +41,8 @@ const GAIN_TIME_MS: core::ops::RangeInclusive<u32> = 1_000..=600_000;
 const ERROR_MAX: u32 = 10_000_000;
 /// What is said of a sensor that has not been read.
 const UNREAD: i32 = i32::MIN;
+/// Clocks further ahead than this are not compared.
+const STANDBY_TOLD_MAX: u32 = 1 << 30;
 
 const WRONG: ShutdownReason = ShutdownReason::InvalidHeater;
 
@@ -209,6 +211,12 @@ impl Heater {
         }
     }
 
+    /// When the stand-by time is over, where that is near enough to be told as a clock.
+    fn standby_ends(&self, seen: Clock32) -> Option<Clock32> {
+        let left = u32::try_from(self.left).ok().filter(|&left| left < STANDBY_TOLD_MAX)?;
+        (self.state == State::Standby).then(|| seen.wrapping_add(left))
+    }
+
     /// What is held; 0 is off.
     fn target(&self) -> i32 {
         match self.state {
@@ -365,9 +373,13 @@ impl Heaters {
         }
     }
 
-    /// When the clock has to be looked at again.
-    pub(crate) const fn event_at(&self) -> Option<Clock32> {
+    /// When the clock has to be looked at again: as the lease ends, and as a stand-by time does.
+    pub(crate) fn event_at(&self) -> Option<Clock32> {
+        let standby_ends = self.slots.iter().flatten().filter_map(|heater| heater.standby_ends(self.seen));
         self.alive
+            .into_iter()
+            .chain(standby_ends)
+            .reduce(|first, at| if at.is_before(first) { at } else { first })
     }
 
     /// Goes on with one heater that has something to do.

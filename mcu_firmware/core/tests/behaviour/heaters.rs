@@ -290,6 +290,25 @@ fn without_a_lease_a_target_is_stand_by_from_the_start() {
 }
 
 #[test]
+fn stand_by_ends_on_time() {
+    for standby_s in [1, 3, 7, 12] {
+        let mut oven = Oven::new();
+        oven.bench.send(&set(200, 140, standby_s));
+        oven.run(20.0);
+        oven.is_attended = false;
+        // The lease was renewed last half a second ago or less. Nobody asks: that would have the board look at its clock.
+        oven.run(4.4 + f64::from(standby_s) - 1.0);
+        oven.on = 0;
+        oven.run(1.0);
+        assert!(oven.on > 0, "{standby_s}");
+        oven.run(1.2);
+        oven.on = 0;
+        oven.run(1.0);
+        assert_eq!((oven.on, oven.state().3), (0, OVER), "{standby_s}");
+    }
+}
+
+#[test]
 fn leases_and_stand_by_last_as_long_across_the_wraps_of_the_clock() {
     for before in [1.0, 3.0, 8.0] {
         let mut oven = Oven::at((1 << 32) - (before * SECOND as f64) as u64, 1);

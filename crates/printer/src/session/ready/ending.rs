@@ -5,6 +5,7 @@ use units::Seconds;
 use super::{Held, Ready, Wait};
 use crate::{
     error::{Ended, ErrorCode, PrinterError},
+    journal::MovedBy,
     planner::{ExtrusionPermit, Planner},
     session::{
         event::Event,
@@ -150,6 +151,9 @@ impl Ready {
                 self.last_active = now;
             }
             return;
+        }
+        if self.diary.is_z_moved_by_others() && self.planner.guard.homed()[2] {
+            self.note_height(self.planner.position()[2], MovedBy::Nobody);
         }
         let state = self.job.as_ref().map(|job| job.state.clone());
         match state {

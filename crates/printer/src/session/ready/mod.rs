@@ -160,6 +160,9 @@ impl Ready {
         // After a long pause nothing may be claimed of the motion clock, whose 32 bits say little then.
         self.lease.is_in_doubt(&mut self.board, now);
         for (message, sent) in inbox::receive(&mut self.board.link, &self.board.dictionary, bytes, now) {
+            if let Some(sent) = sent {
+                self.board.said_after = self.board.said_after.max(sent);
+            }
             self.on_message(message, sent, now)?;
         }
         Ok(())
@@ -279,6 +282,7 @@ impl Ready {
         }
         self.advance_wait(now);
         self.advance_hold(now)?;
+        self.diary.tell_progress(now);
         self.pump(now)?;
         self.renew_lease(now);
         self.rest(now);
@@ -290,7 +294,7 @@ impl Ready {
             Due::MoveEnd(made) => {
                 let elapsed = self.stream.elapsed(made.end, &self.board);
                 if made.line > 0 && self.plans_job() {
-                    self.diary.progress(made.line, elapsed, now);
+                    self.diary.progress(made.line, elapsed);
                 }
                 if let Some(job) =
                     self.job.as_mut().filter(|job| made.line > 0 && now - job.told >= PROGRESS_INTERVAL)

@@ -7,7 +7,7 @@ use units::{Celsius, Seconds};
 use super::{Failure, Ready, Wait};
 use crate::{
     error::{ErrorCode, PrinterError},
-    journal::Input,
+    journal::{Input, MovedBy},
     planner::{Barrier, ExtrusionPermit, Planned, TimedAction},
     session::{
         event::{Event, ScheduledMove, SpeedProfile},
@@ -98,8 +98,10 @@ impl Ready {
                 let run = self.stream.start_run(position, &self.board, now, homing);
                 self.lease.forget();
                 if !homing && self.plans_job() {
+                    self.note_height(position[2], MovedBy::File);
                     self.diary.run(run.start, &mut self.board);
                 } else {
+                    self.note_height(position[2], MovedBy::Others);
                     self.diary.other_run(&mut self.board);
                 }
                 if let Wait::Homing { axis, .. } = &mut self.wait {
@@ -146,6 +148,17 @@ impl Ready {
         };
         self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
         self.events.push(Event::Move(scheduled));
+    }
+
+    /// Has the journal know that Z stands there, and who moves it from here on.
+    pub(in crate::session) fn note_height(&mut self, z: f64, by: MovedBy) {
+        const Z: usize = 2;
+        let is_inverted = self.board.layout.steppers[Z].is_some_and(|oids| oids.invert_dir);
+        let count = self.stream.count(Z);
+        let count = if is_inverted { count.wrapping_neg() } else { count };
+        let step_mm = self.config.steppers[Z].step_distance().0;
+        let by = if self.planner.guard.homed()[Z] { by } else { MovedBy::Others };
+        self.diary.height(z, count, by, step_mm);
     }
 
     /// Notes what a job leaves behind.

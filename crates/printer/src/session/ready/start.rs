@@ -30,7 +30,7 @@ impl Ready {
             homed: [true; 3],
             could_extrude: false,
             targets: Vec::new(),
-            start: Some(Start { clear_z: 0.0, fan: 0.0 }),
+            start: Some(Start { line, clear_z: 0.0, fan: 0.0 }),
         });
         Ok(())
     }
@@ -56,7 +56,7 @@ impl Ready {
                 }
                 paused.position = paused.planner.position();
                 paused.targets.clone_from(&skip.targets);
-                paused.start = Some(Start { clear_z, fan: skip.fan });
+                paused.start = Some(Start { line: line.0, clear_z, fan: skip.fan });
                 let is_hot = |&(heater, target): &(gcode::Heater, Celsius)| {
                     heater == gcode::Heater::Tool(0) && target > Celsius::ZERO
                 };

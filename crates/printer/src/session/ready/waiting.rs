@@ -8,6 +8,7 @@ use units::{Celsius, Seconds};
 use super::{Failure, Ready};
 use crate::{
     error::{ErrorCode, PrinterError},
+    journal::MovedBy,
     machine,
     planner::Barrier,
     session::{
@@ -246,6 +247,9 @@ impl Ready {
                 self.stream.disable(motors, &mut self.board, now);
                 for axis in (0..3).filter(|&axis| motors[axis]) {
                     self.planner.guard.set_homed(axis, false);
+                }
+                if motors[2] {
+                    self.note_height(self.planner.position()[2], MovedBy::Others);
                 }
             }
             Barrier::WaitForMoves => {}
