@@ -13,6 +13,7 @@ const SNAPSHOT: SessionSnapshot = {
   position: null,
   homed: [false, false, false],
   job: 'none',
+  start: null,
   line: 0,
   elapsed: seconds(0),
   queued: null,

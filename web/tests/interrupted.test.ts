@@ -78,7 +78,7 @@ test('while a printer is connected nothing is offered; a board that holds nothin
   worker().say({ kind: 'held-print', held: null });
   worker().say({ kind: 'snapshot', snapshot: NOW });
   expect(shown().map(({ text }) => text)).toEqual([expect.stringContaining('does not hold it any more')]);
-  expect(shown()[0]?.action?.text).toBe('Continue from line 8…');
+  expect(shown()[0]?.action?.text).toBe('Continue from a line…');
   // Nothing is offered beside a print that runs.
   worker().say({ kind: 'snapshot', snapshot: { ...NOW, job: 'printing' } });
   expect(shown()).toEqual([]);

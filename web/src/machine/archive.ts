@@ -4,14 +4,7 @@
 // Knows no port and no session; what a journal says, the planner reads.
 import type { PortId } from '../transport/web_serial';
 import type { Ending } from './machine';
-import {
-  type KeptFile,
-  type KeptPrint,
-  type PrintFacts,
-  type PrintStart,
-  type Trouble,
-  WHOLE,
-} from './protocol';
+import { type KeptPrint, type PrintFacts, type PrintStart, type Trouble, WHOLE } from './protocol';
 import type { JournalSummary } from './session';
 import { type OpenPrint, type PrintStore, StorageError } from './storage';
 import { copyMissing, otherFile, storageTrouble } from './troubles';
@@ -320,19 +313,22 @@ export class Archive {
     }
   }
 
-  /** The file of a print that is kept: its copy, or the one that the user has given, where that is it. */
-  async fileOf(id: string, given: Blob | null): Promise<KeptFile> {
+  /** The file of a print that is kept: its copy, null without one, or the one that the user has given, where that is it. */
+  async fileOf(id: string, given: Blob | null): Promise<Blob | Trouble | null> {
     try {
       const { facts, fileBytes } = await this.#about(id);
-      if (given === null) {
-        const file = await this.#store.openFile(id).catch(() => null);
-        return file ? { kind: 'there', file } : { kind: 'missing', trouble: null };
-      }
+      if (given === null) return await this.#store.openFile(id).catch(() => null);
       const isIts = given.size === fileBytes && (await this.#store.isItsFile(id, given));
-      return isIts ? { kind: 'there', file: given } : { kind: 'missing', trouble: otherFile(facts.name) };
+      return isIts ? given : otherFile(facts.name);
     } catch (error) {
-      return { kind: 'missing', trouble: troubleOf(error) };
+      return troubleOf(error);
     }
+  }
+
+  /** The journal of a print, and the machine's file as it was then. Rejects where they cannot be read. */
+  async recordOf(id: string): Promise<{ readonly journal: Uint8Array; readonly config: string }> {
+    const { machine } = await this.#about(id);
+    return { journal: await this.#store.readJournal(id), config: machine.config };
   }
 
   /** Whether a file from the user can be the print's. Rejects where nothing can be read. */

@@ -2,7 +2,7 @@
 // Knows no port and no clock: bytes and time are arguments.
 import type { VirtualState } from '../bindings/VirtualState';
 import type { Seconds } from '../units';
-import type { MachineEvent, PrintStart, Snapshot, Trouble, Wish } from './protocol';
+import type { Interruption, MachineEvent, PrintStart, Snapshot, Trouble, Wish } from './protocol';
 
 /** What a session knows of a snapshot; the rest is its owner's. */
 export type SessionSnapshot = Omit<Snapshot, 'wakeUps'>;
@@ -45,6 +45,18 @@ export interface Session {
   snapshot(now: Seconds): SessionSnapshot;
   /** Pairs of time (s, relative to now) and the toolhead's planned speed (mm/s). */
   plannedSpeed(now: Seconds, behind: Seconds, ahead: Seconds): Float64Array<ArrayBuffer>;
+  free(): void;
+}
+
+/** Finds out where an interrupted print was. Moves nothing. */
+export interface Survey {
+  /** How many bytes of the print's file may be fed now; none once it is done. */
+  wants(): number;
+  feed(bytes: Uint8Array): void;
+  /** The file has ended. */
+  end(): void;
+  /** Null while it is not done. */
+  report(): Interruption | null;
   free(): void;
 }
 

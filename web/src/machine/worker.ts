@@ -10,10 +10,11 @@ import { Archive, type PrintLog } from './archive';
 import { Broadcast } from './broadcast';
 import { Connection, Died, type Parts } from './connection';
 import { Continuation } from './continuation';
+import { locate } from './locate';
 import { LockstepLoop } from './lockstep';
 import { type Keeping, Machine } from './machine';
 import { loadPlanner, type Planner } from './planner';
-import type { FromMachine, PortChoice, Snapshot, ToMachine, Trouble, Wish } from './protocol';
+import type { FromMachine, KeptFile, PortChoice, Snapshot, ToMachine, Trouble, Wish } from './protocol';
 import { RealTimeLoop } from './realtime';
 import { PrintStore } from './storage';
 import { answerTrouble, plannerMissing, portInUse, portTrouble, stopNotSent } from './troubles';
@@ -202,7 +203,12 @@ async function forget(id: string): Promise<void> {
 }
 
 async function tellFile({ id, print, given }: ToMachine & { kind: 'kept-file' }): Promise<void> {
-  if (planner) tell({ kind: 'kept-file', id, found: await archiveOf(planner).fileOf(print, given) });
+  if (!planner) return;
+  const prints = archiveOf(planner);
+  const file = await prints.fileOf(print, given);
+  const found: KeptFile =
+    file instanceof Blob ? await locate(planner, prints, print, file) : { kind: 'missing', trouble: file };
+  tell({ kind: 'kept-file', id, found });
 }
 
 async function connectVirtual(

@@ -15,7 +15,7 @@ import {
   progress,
   reached,
 } from '../state/print';
-import { starting, startObstacle } from '../state/start';
+import { isToBegin, starting, startObstacle } from '../state/start';
 import { askWhereToBegin } from '../state/start_request';
 import { Fact } from './facts';
 import { Findings } from './findings';
@@ -94,7 +94,7 @@ const HEATERS = { extruder: 'nozzle', heater_bed: 'bed' } as const;
 
 /** What a print that begins in the middle of its file is waiting for. */
 function waitingToBegin(line: number): string {
-  if (job.value === 'paused') return startObstacle.value ?? `Ready to begin with line ${formatNumber(line)}.`;
+  if (isToBegin.value) return startObstacle.value ?? `Ready to begin with line ${formatNumber(line)}.`;
   return `Reading the file up to line ${formatNumber(line)}. Nothing moves.`;
 }
 

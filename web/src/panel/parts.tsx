@@ -83,6 +83,8 @@ interface NumberFieldProps {
   /** Why the field cannot be used now; null where it can. */
   readonly why?: string | null;
   readonly hideLabel?: boolean;
+  /** Told whether what is typed cannot be set. Then it stays, with what is wrong with it, when the field is left. */
+  readonly onWrong?: (isWrong: boolean) => void;
   /** What is set acts on the machine: only Enter and the button pass it on, and leaving the field puts it away. */
   readonly acts?: boolean;
   /** Called with a number between `min` and `max`: on Enter, and, unless it `acts`, on leaving the field after a change. */
@@ -98,7 +100,7 @@ interface Draft {
   readonly leave: () => void;
 }
 
-function useDraft({ value, min, max, acts, onSet }: NumberFieldProps, isOff: boolean): Draft {
+function useDraft({ value, min, max, acts, onWrong, onSet }: NumberFieldProps, isOff: boolean): Draft {
   const [text, set] = useState<string | null>(null);
   const number = text === null ? value : parseNumber(text);
   const isWrong = number === undefined || number < min || number > max;
@@ -106,6 +108,16 @@ function useDraft({ value, min, max, acts, onSet }: NumberFieldProps, isOff: boo
   useEffect(() => {
     if (isOff) set(null);
   }, [isOff]);
+  // Told of a change alone: several fields may have one listener.
+  const wasWrong = useRef(false);
+  useEffect(() => {
+    if (wasWrong.current !== isWrong) onWrong?.(isWrong);
+    wasWrong.current = isWrong;
+  }, [isWrong, onWrong]);
+  // It was set from elsewhere: what is typed is out of date.
+  useEffect(() => {
+    if (onWrong) set(null);
+  }, [value, onWrong]);
   const commit = (): void => {
     if (text === null || isWrong || isOff) return;
     set(null);
@@ -113,7 +125,7 @@ function useDraft({ value, min, max, acts, onSet }: NumberFieldProps, isOff: boo
   };
   const leave = (): void => {
     if (!acts) commit();
-    set(null);
+    if (!onWrong || !isWrong) set(null);
   };
   return { text, isWrong, set, commit, leave };
 }

@@ -1,8 +1,8 @@
 // Where a print is to begin: by layer or by line, for the file that is shown or for an interrupted print. Says what is
 // known and what is not. Its button has the file read up to there; what moves is for the user to say after that.
 import type { JSX } from 'preact';
-import { useEffect, useId, useState } from 'preact/hooks';
-import type { KeptPrint } from '../machine/protocol';
+import { useEffect, useState } from 'preact/hooks';
+import type { Interruption, KeptPrint } from '../machine/protocol';
 import type { Summary } from '../preview/protocol';
 import { timeOf } from '../state/interrupted';
 import { failure, linesOf, reading, summary } from '../state/preview';
@@ -56,11 +56,6 @@ function Lines({ blob, line }: { readonly blob: Blob; readonly line: number }): 
 function Facts({ place, plan }: { readonly place: Place; readonly plan: Summary }): JSX.Element {
   return (
     <dl class="facts">
-      <Fact name="Layer">
-        {place.layer === 0
-          ? 'before the first'
-          : `${formatNumber(place.layer)} of ${formatNumber(place.layers)}`}
-      </Fact>
       <Fact name="Height">{place.z === null ? '–' : `${formatNumber(place.z, 2)} mm`}</Fact>
       <Fact name="Time before it">{plan.time === null ? '–' : formatDuration(place.before)}</Fact>
       <Fact name="Time from there">
@@ -75,47 +70,59 @@ const WhatHappens = (): JSX.Element => (
     <h3>What happens</h3>
     <ol class="plain-list">
       <li>The file is read up to this line. Nothing moves and nothing is heated.</li>
-      <li>You say where Z stands, home X and Y, and look whether the part still sticks to the bed.</li>
+      <li>You say where Z stands, and look whether the part still sticks to the bed.</li>
       <li>
-        You press Resume. It heats, goes up above all that has been printed, across, down at the place of this
-        line, and on.
+        You press Resume. The nozzle gets warm enough to come free, goes up above all that has been printed, X
+        and Y are homed, everything is heated, and the print goes on with this line.
       </li>
     </ol>
   </div>
 );
 
-const NotKnown = ({ lost }: { readonly lost: KeptPrint | null }): JSX.Element => (
+const NotKnown = ({ isLost }: { readonly isLost: boolean }): JSX.Element => (
   <div class="stack tight">
     <h3>What is not known</h3>
     <ul class="plain-list">
-      {lost && (
-        <li>
-          The very last line: up to two seconds more may have been printed than was told. Look at the part,
-          and change the line where you see better.
-        </li>
-      )}
       <li>
-        Where Z stands
-        {lost
-          ? ': without current motors slip a little, and the head may sink'
-          : ', unless it was homed and has had current since'}
-        . It cannot be homed with a part in the way.
+        {isLost
+          ? 'Where Z stands: without current its motor falls to a full step nearby, and a heavy head may sink.'
+          : 'Where Z stands, unless it was homed and has had current since.'}{' '}
+        It cannot be homed with a part in the way.
       </li>
       <li>Whether the part is still where it was. One that has cooled may have come off the bed.</li>
     </ul>
   </div>
 );
 
-function KnownOf({ lost }: { readonly lost: KeptPrint }): JSX.Element {
-  const { facts, line, heardOf } = lost;
+interface KnownProps {
+  readonly lost: KeptPrint;
+  readonly at: Interruption | null;
+}
+
+function KnownOf({ lost: { facts, line, heardOf }, at }: KnownProps): JSX.Element {
+  const last = at?.line ?? line;
   return (
-    <dl class="facts">
-      <Fact name="File">{facts.name}</Fact>
-      <Fact name="Last known line">
-        {line > 0 ? `${formatNumber(line)} of ${formatNumber(facts.lines)}` : '–'}
-      </Fact>
-      <Fact name="Last heard of">{timeOf(heardOf)}</Fact>
-    </dl>
+    <>
+      <dl class="facts">
+        <Fact name="File">{facts.name}</Fact>
+        <Fact name="Interrupted">{timeOf(heardOf)}</Fact>
+        <Fact name="After line">
+          {last > 0 ? `${formatNumber(last)} of ${formatNumber(facts.lines)}` : '–'}
+        </Fact>
+        {at && (
+          <Fact name="In layer">
+            {formatNumber(at.layer)}, at {formatNumber(at.layerZ, 2)} mm
+          </Fact>
+        )}
+      </dl>
+      {at && at.reachLine > last && (
+        <p>
+          It may have got as far as line {formatNumber(at.reachLine)} before it stopped. What was made after
+          line {formatNumber(last)} is made twice. Where you can see on the part how far it got, change the
+          line.
+        </p>
+      )}
+    </>
   );
 }
 
@@ -124,55 +131,61 @@ interface FormProps {
   readonly plan: Summary;
   readonly proposed: number;
   readonly lost: KeptPrint | null;
+  readonly at: Interruption | null;
 }
 
 const close = (): void => {
   startRequest.value = null;
 };
 
-function Form({ blob, plan, proposed, lost }: FormProps): JSX.Element {
+function Form({ blob, plan, proposed, lost, at }: FormProps): JSX.Element {
   const max = Math.max(LINE_MIN, plan.lines);
   const [line, setLine] = useState(Math.min(Math.max(proposed, LINE_MIN), max));
+  const [isWrong, setWrong] = useState(false);
   const [isBusy, setBusy] = useState(false);
-  const hintId = useId();
   const place = placeOf(plan, line);
-  const why = obstacle.value;
+  const why = obstacle.value ?? (isWrong ? 'The file has no such place: see above.' : null);
   const go = async (): Promise<void> => {
     if (isBusy) return;
     setBusy(true);
-    const isBegun = await printShown(place, lost);
+    const isBegun = await printShown(place, lost, at);
     setBusy(false);
     if (isBegun) close();
   };
   return (
     <>
-      <div class="row wrap end">
+      <div class="row wrap start">
         <NumberField
-          label="Layer"
-          unit={`of ${formatNumber(plan.layers.length)}`}
+          label={`Layer (of ${formatNumber(plan.layers.length)})`}
+          unit=""
           value={Math.max(1, place.layer)}
           min={1}
           max={plan.layers.length}
+          onWrong={setWrong}
           onSet={(layer) => setLine(Math.max(LINE_MIN, lineOfLayer(plan, Math.round(layer))))}
         />
         <NumberField
-          label="Line"
-          unit={`of ${formatNumber(plan.lines)}`}
+          label={`Line (of ${formatNumber(plan.lines)})`}
+          unit=""
           value={line}
           min={LINE_MIN}
           max={max}
+          onWrong={setWrong}
           onSet={(number) => setLine(Math.round(number))}
         />
       </div>
       <Lines blob={blob} line={line} />
       <Facts place={place} plan={plan} />
-      {place.layer === 0 && (
-        <p class="hint" id={hintId}>
-          Nothing is printed before this line. To print all of it press Print instead, which homes all axes.
-        </p>
+      {at && at.layerLine > 1 && at.layerLine < line && (
+        <div class="row wrap">
+          <Button onClick={() => setLine(at.layerLine)}>
+            Begin with all of layer {formatNumber(at.layer)}
+          </Button>
+          <span class="hint">That prints over what is there of this layer.</span>
+        </div>
       )}
       <WhatHappens />
-      <NotKnown lost={lost} />
+      <NotKnown isLost={lost !== null} />
       <div class="dialog-foot sticky">
         {why && <p class="hint">{why}</p>}
         <Button class="big" onClick={close}>
@@ -201,7 +214,7 @@ function OfShown(props: Omit<FormProps, 'plan'>): JSX.Element {
 function Body({ request }: { readonly request: StartRequest }): JSX.Element {
   switch (request.kind) {
     case 'shown':
-      return <OfShown key="shown" blob={request.blob} proposed={request.line} lost={null} />;
+      return <OfShown key="shown" blob={request.blob} proposed={request.line} lost={null} at={null} />;
     case 'looking':
       return <p role="status">Looking for the file of {request.lost.facts.name}.</p>;
     case 'needs-file': {
@@ -213,7 +226,7 @@ function Body({ request }: { readonly request: StartRequest }): JSX.Element {
             with ({formatBytes(lost.fileBytes)}).
           </p>
           {trouble && <Said of={trouble} />}
-          <KnownOf lost={lost} />
+          <KnownOf lost={lost} at={null} />
           <div class="dialog-foot">
             <Button
               kind="primary"
@@ -231,15 +244,17 @@ function Body({ request }: { readonly request: StartRequest }): JSX.Element {
       return (
         <>
           <p>
-            The print was interrupted, and the board has forgotten it. It can go on from a line of its file,
-            of which a copy was kept.
+            The print was interrupted, and its board has forgotten it: after a loss of power, a restart or a
+            stop. It can go on from a line of its file.
           </p>
-          <KnownOf lost={request.lost} />
+          <KnownOf lost={request.lost} at={request.at} />
+          {request.trouble && <Said of={request.trouble} />}
           <OfShown
             key="lost"
             blob={request.blob}
-            proposed={lineAfter(request.lost) ?? LINE_MIN}
+            proposed={lineAfter(request.lost, request.at) ?? LINE_MIN}
             lost={request.lost}
+            at={request.at}
           />
         </>
       );

@@ -1,14 +1,15 @@
-// What there is to do before a print goes on that begins in the middle of its file: say where Z is, home X and Y, look at
-// the part. Step by step, beside the controls for moving by hand; Resume waits for all of it.
+// What there is to do before a print goes on that begins in the middle of its file: say where Z stands, and look at the
+// part. Step by step, beside the controls for moving by hand; Resume waits for it.
 import { signal } from '@preact/signals';
 import type { ComponentChildren, JSX } from 'preact';
-import { job, snapshot, wish } from '../state/machine';
-import { isPartThere, liftBefore, type Starting, starting } from '../state/start';
+import type { Interruption } from '../machine/protocol';
+import { snapshot, wish } from '../state/machine';
+import { isPartThere, isToBegin, nearestPlace, type Starting, starting } from '../state/start';
 import { mm } from '../units';
 import { Icon } from './icons';
 import { machineSummary } from './machine_summary';
 import { formatNumber } from './numbers';
-import { Button, NumberField } from './parts';
+import { Button, Choice, NumberField } from './parts';
 
 const Z = 2;
 /** A sheet of paper. */
@@ -16,25 +17,11 @@ const PAPER_MM = 0.1;
 
 /** What is typed for Z; null: what is proposed. */
 const typedZ = signal<{ readonly of: Starting; readonly z: number } | null>(null);
-/** Homing has been asked for, and is not over yet. */
-const isHoming = signal(false);
-
 const axisZ = () => machineSummary.value?.axes[Z];
 
 /** Where Z stands, as far as that is known. */
 const knownZ = (): number | null =>
   snapshot.value?.homed[Z] ? (snapshot.value.position?.[Z] ?? null) : null;
-
-/** Up, so that the nozzle does not drag over the part, then X and Y. Where Z is not known nothing is lifted, and nothing homed. */
-export async function liftAndHome(): Promise<void> {
-  const [begun, axis, z] = [starting.value, axisZ(), knownZ()];
-  if (!begun || !axis || z === null || isHoming.value) return;
-  isHoming.value = true;
-  const lift = liftBefore(z, begun.place.top, axis);
-  const isLifted = lift === 0 || (await wish({ kind: 'jog', axis: 'Z', distance: lift }));
-  if (isLifted) await wish({ kind: 'home', axes: ['X', 'Y'] });
-  isHoming.value = false;
-}
 
 interface StepProps {
   readonly title: string;
@@ -57,12 +44,62 @@ function Step({ title, isDone, children }: StepProps): JSX.Element {
   );
 }
 
+const millimetres = (z: number): string => `${formatNumber(z, 2)} mm`;
+
+/** What the file, the journal and the motor say of Z. */
+function WhereZWas({ at, value }: { readonly at: Interruption; readonly value: number }): JSX.Element | null {
+  const { zRange, zPlaces, zError } = at;
+  if (!zRange) return <p>Z was being moved by hand or homed when the print was interrupted: measure it.</p>;
+  const [low, high] = zRange;
+  const was =
+    high - low < 0.005 ? `at ${millimetres(low)}` : `between ${millimetres(low)} and ${millimetres(high)}`;
+  if (zPlaces.length === 0)
+    return (
+      <p>
+        Z was {was}. It may stand up to {millimetres(zError)} from there now: measure it.
+      </p>
+    );
+  const nearest = nearestPlace(at, value);
+  const isOff = nearest !== null && Math.abs(nearest - value) > 0.005;
+  return (
+    <>
+      <p>
+        Z was {was}. With current again its motor stands at{' '}
+        {zPlaces.length === 1 ? millimetres(zPlaces[0] ?? 0) : 'one of these places, the likeliest first'},
+        unless the head has sunk{zError >= 0.005 && `; give or take ${millimetres(zError)}`}.
+      </p>
+      {zPlaces.length > 1 && (
+        <Choice
+          label="Places where Z can stand"
+          hideLabel
+          choices={zPlaces.map((place, value) => ({ value, text: millimetres(place) }))}
+          value={zPlaces.indexOf(nearest ?? mm(Number.NaN))}
+          onSet={(index) => type(zPlaces[index] ?? value)}
+        />
+      )}
+      {isOff && (
+        <p class="row wrap hint">
+          <span>
+            The motor can stand at {millimetres(nearest)}, not at {millimetres(value)}.
+          </span>
+          <Button onClick={() => type(nearest)}>Take {millimetres(nearest)}</Button>
+        </p>
+      )}
+    </>
+  );
+}
+
+function type(z: number): void {
+  const of = starting.value;
+  if (of) typedZ.value = { of, z };
+}
+
 function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
   const axis = axisZ();
   const known = knownZ();
-  const { top, z } = begun.place;
+  const { place, at } = begun;
   const [min, max] = [axis?.min ?? 0, axis?.max ?? 0];
-  const proposed = known ?? (begun.lost ? (z ?? top) : top);
+  const proposed = known ?? at?.zPlaces[0] ?? at?.zRange?.[0] ?? place.top;
   const typed = typedZ.value?.of === begun ? typedZ.value.z : null;
   const value = Math.min(Math.max(typed ?? proposed, min), max);
   const say = async (): Promise<void> => {
@@ -70,16 +107,16 @@ function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
   };
   return (
     <Step title="Where Z stands" isDone={known !== null}>
-      <p>
-        {known === null
-          ? 'Z cannot be homed with the part in the way: say where the nozzle is.'
-          : `Taken to stand at ${formatNumber(known, 2)} mm. Where that is not so, correct it.`}
-        {begun.lost && known === null && ' What is proposed is where it was when it was last heard of.'}
-      </p>
+      {known === null ? (
+        <p>Z cannot be homed with the part in the way: say where the nozzle is.</p>
+      ) : (
+        <p>Taken to stand at {millimetres(known)}. Where that is not so, correct it.</p>
+      )}
+      {at && known === null && <WhereZWas at={at} value={value} />}
       <p class="hint">
-        Once something is said, Z can be moved under Motion. Go down until a sheet of paper just slides: on
-        the bed, beside the part, that is {formatNumber(PAPER_MM, 1)} mm, on top of the part{' '}
-        {formatNumber(top + PAPER_MM, 2)} mm. Then say so here.
+        To measure: say what is likely, then move Z under Motion until a sheet of paper just slides. On the
+        bed, beside the part, that is {formatNumber(PAPER_MM, 1)} mm; on top of the part{' '}
+        {millimetres(place.top + PAPER_MM)}. Then correct it here.
       </p>
       <div class="row wrap end">
         <NumberField
@@ -88,49 +125,13 @@ function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
           value={value}
           min={min}
           max={max}
-          decimals={2}
-          onSet={(number) => {
-            typedZ.value = { of: begun, z: number };
-          }}
+          decimals={3}
+          onSet={type}
         />
         <Button kind={known === null ? 'primary' : 'plain'} onClick={() => void say()}>
-          {known === null ? 'Z is there' : 'Correct Z'}
+          {known === null ? 'Z stands there' : 'Correct Z'}
         </Button>
       </div>
-    </Step>
-  );
-}
-
-function HomeXY({ begun }: { readonly begun: Starting }): JSX.Element {
-  const [x, y] = snapshot.value?.homed ?? [false, false];
-  const isDone = Boolean(x && y);
-  const [axis, z] = [axisZ(), knownZ()];
-  const lift = axis && z !== null ? liftBefore(z, begun.place.top, axis) : 0;
-  const above = formatNumber((z ?? 0) + lift, 2);
-  return (
-    <Step title="Home X and Y" isDone={isDone}>
-      {isDone ? (
-        <p>X and Y are homed.</p>
-      ) : (
-        <>
-          <p>
-            The head goes {lift > 0 ? `up to ${above} mm, then ` : ''}to the switches of X and Y. Keep the way
-            free.
-          </p>
-          <div class="row wrap">
-            <Button
-              kind={z === null ? 'plain' : 'primary'}
-              icon="home"
-              busy={isHoming.value}
-              why={z === null ? 'Say first where Z is: the nozzle may stand on the part.' : null}
-              onClick={() => void liftAndHome()}
-            >
-              Lift and home X and Y
-            </Button>
-            {z === null && <span class="hint">Say first where Z is: the nozzle may stand on the part.</span>}
-          </div>
-        </>
-      )}
     </Step>
   );
 }
@@ -155,20 +156,26 @@ function LookAtPart(): JSX.Element {
 /** The steps, while a print waits to begin; nothing otherwise. */
 export function StartSteps(): JSX.Element | null {
   const begun = starting.value;
-  if (!begun || job.value !== 'paused') return null;
+  if (!begun || !isToBegin.value) return null;
   const { line, layer, z } = begun.place;
+  const { homed = [false, false, false], start = null } = snapshot.value ?? {};
+  const homes = ['X', 'Y'].filter((_, axis) => !homed[axis]).join(' and ');
   return (
     <section class="start-steps" aria-label="Before it goes on">
       <p>
         The print begins with line {formatNumber(line)}
-        {z !== null && `, in layer ${formatNumber(layer)} at ${formatNumber(z, 2)} mm`}. Three things first;
-        then press Resume.
+        {z !== null && `, in layer ${formatNumber(layer)} at ${millimetres(z)}`}. Two things first:
       </p>
       <ol>
         <SayZ begun={begun} />
-        <HomeXY begun={begun} />
         <LookAtPart />
       </ol>
+      <p>
+        Then press Resume: the nozzle gets warm enough to come free and goes up to{' '}
+        {millimetres(start?.clearZ ?? 0)},{' '}
+        {homes !== '' && `${homes} ${homes.length > 1 ? 'are' : 'is'} homed, `}
+        everything is heated, and it goes across, down, and on. Keep the way free.
+      </p>
     </section>
   );
 }

@@ -15,7 +15,7 @@ export interface Layer {
   /** The layer's first vertex. */
   readonly first: number;
   readonly z: Mm;
-  /** With this line a print of it can begin; 0 where nothing is extruded in it. */
+  /** A print that begins with this line makes the whole layer; 1 for the first. */
   readonly line: number;
   readonly time: Seconds;
 }

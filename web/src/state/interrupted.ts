@@ -69,7 +69,7 @@ function tell(print: KeptPrint, isLost: boolean, connect: (print: KeptPrint) => 
       text: `${happened} The board does not hold it any more: it cannot go on with its next step, ${hope}.`,
       ...(line !== null && {
         action: {
-          text: `Continue from line ${line.toLocaleString()}…`,
+          text: 'Continue from a line…',
           act: () => void askToContinue(print),
           why: null,
         },

@@ -1,10 +1,10 @@
 // The print that runs, or that ran last: its file, and how far it is. Another file may be looked at meanwhile, so
 // nothing here depends on the one that is shown.
 import { computed, effect, signal } from '@preact/signals';
-import type { KeptPrint, Snapshot } from '../machine/protocol';
+import type { Interruption, KeptPrint, Snapshot } from '../machine/protocol';
 import type { Layer, Summary } from '../preview/protocol';
 import { consent } from './confirm';
-import { isPrinting, outcome, port, print, snapshot } from './machine';
+import { isPrinting, outcome, port, print, snapshot, wish } from './machine';
 import type { LineMarks } from './marks';
 import { file, lineMarks, type OpenFile, summary } from './preview';
 import { begin, type Place } from './start';
@@ -50,9 +50,13 @@ export const reached = computed(() => (isShown.value && outcome.value !== 'done'
 
 /**
  * Starts the print of the file that is shown: from its beginning or from a place in it, as one of its own or in the place
- * of one that was interrupted. True where it is begun.
+ * of one that was interrupted `at` some place. True where it is begun.
  */
-export async function printShown(from: Place | null = null, lost: KeptPrint | null = null): Promise<boolean> {
+export async function printShown(
+  from: Place | null = null,
+  lost: KeptPrint | null = null,
+  at: Interruption | null = null,
+): Promise<boolean> {
   const [open, found] = [file.value, summary.value];
   if (!open || !found) return false;
   const before = printed.value;
@@ -61,7 +65,10 @@ export async function printShown(from: Place | null = null, lost: KeptPrint | nu
   const start = { confirmedLines: consent.value, line: from?.line ?? null };
   const isBegun = await print(open.blob, facts, start, lost?.id ?? null);
   if (!isBegun) printed.value = before;
-  else if (from) begin(from, lost);
+  else if (from) begin(from, at);
+  // As they were when it was interrupted.
+  if (isBegun && at && at.speedFactor !== 1) await wish({ kind: 'speed-factor', value: at.speedFactor });
+  if (isBegun && at && at.flowFactor !== 1) await wish({ kind: 'flow-factor', value: at.flowFactor });
   return isBegun;
 }
 

@@ -1,7 +1,7 @@
 // The question where a print is to begin: for the file that is shown, or for an interrupted print whose board has
 // forgotten it. Finds that print's file and shows it. Begins nothing and moves nothing.
 import { effect, signal } from '@preact/signals';
-import type { KeptFile, KeptPrint, Trouble } from '../machine/protocol';
+import type { Interruption, KeptFile, KeptPrint, Trouble } from '../machine/protocol';
 import { confirmAgain } from './confirm';
 import { keptFile } from './machine';
 import { file, openFile, summary } from './preview';
@@ -13,8 +13,14 @@ export type StartRequest =
   | { readonly kind: 'looking'; readonly lost: KeptPrint }
   /** The user has to give it; `trouble` says why what was given, or is kept, will not do. */
   | { readonly kind: 'needs-file'; readonly lost: KeptPrint; readonly trouble: Trouble | null }
-  /** It is what is shown. */
-  | { readonly kind: 'lost'; readonly lost: KeptPrint; readonly blob: Blob };
+  /** It is what is shown; `trouble` says why its place in it could not be found, where that is so. */
+  | {
+      readonly kind: 'lost';
+      readonly lost: KeptPrint;
+      readonly blob: Blob;
+      readonly at: Interruption | null;
+      readonly trouble: Trouble | null;
+    };
 
 /** Null: nothing is asked. */
 export const startRequest = signal<StartRequest | null>(null);
@@ -34,7 +40,7 @@ export async function askToContinue(lost: KeptPrint, given: Blob | null = null):
   if (found.kind === 'missing') startRequest.value = { kind: 'needs-file', lost, trouble: found.trouble };
   else {
     openFile(found.file, lost.facts.name);
-    startRequest.value = { kind: 'lost', lost, blob: found.file };
+    startRequest.value = { kind: 'lost', lost, blob: found.file, at: found.at, trouble: found.trouble };
   }
 }
 
