@@ -138,6 +138,9 @@ pub(crate) struct SimulateArgs {
     /// Print although lines have commands that are not known
     #[arg(long)]
     pub(crate) confirm_all: bool,
+    /// Print the file so many times, one after the other, as one print
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) repeat: u32,
     /// Resume a print that the board holds because its host was held up, as a user would; it ends there otherwise
     #[arg(long)]
     pub(crate) confirm_holds: bool,

@@ -43,6 +43,8 @@ pub(crate) struct Input {
     size: u64,
     read: Rc<Cell<u64>>,
     given_out: u64,
+    /// How many times it is to be read anew at its end.
+    again: u32,
 }
 
 impl Input {
@@ -65,6 +67,7 @@ impl Input {
             size: about.len(),
             read,
             given_out: 0,
+            again: 0,
         };
         input.fill_head()?;
         let name = path.file_name().and_then(|name| name.to_str());
@@ -87,6 +90,25 @@ impl Input {
         }
     }
 
+    /// Opens a file that is to be read so many times, one after the other.
+    pub(crate) fn repeated(path: &Path, times: u32) -> Result<Self, PrinterError> {
+        let mut input = Self::open(path)?;
+        input.again = times.saturating_sub(1);
+        input.size *= u64::from(times);
+        Ok(input)
+    }
+
+    fn reopen(&mut self) -> Result<(), PrinterError> {
+        let fresh = Self::open(&self.path)?;
+        let (size, given_out, again) = (self.size, self.given_out, self.again - 1);
+        let read_before = self.read.get();
+        *self = Self { size, given_out, again, ..fresh };
+        self.read.set(self.read.get() + read_before);
+        // The last line of what has been read may have no end.
+        self.head.insert(0, b'\n');
+        Ok(())
+    }
+
     /// The next bytes, at most `max` and at most a chunk; none at the end of the file.
     pub(crate) fn next(&mut self, max: usize) -> Result<&[u8], PrinterError> {
         let max = max.min(CHUNK_BYTES);
@@ -95,6 +117,10 @@ impl Input {
             self.buffer.resize(max, 0);
             let count = read_some(&mut self.reader, &mut self.buffer).map_err(|error| self.broken(&error))?;
             self.buffer.truncate(count);
+            if count == 0 && max > 0 && self.again > 0 {
+                self.reopen()?;
+                return self.next(max);
+            }
         } else {
             let count = max.min(self.head.len());
             self.buffer.extend(self.head.drain(..count));
@@ -129,6 +155,7 @@ impl Input {
             buffer: Vec::new(),
             read: Rc::default(),
             given_out: 0,
+            again: 0,
         }
     }
 
@@ -248,6 +275,23 @@ mod tests {
             for max in [7, 4096, usize::MAX] {
                 assert!(read_all(&file.0, max).unwrap() == plain, "{name} in pieces of {max}");
             }
+        }
+    }
+
+    #[test]
+    fn a_file_can_be_read_again_and_again() {
+        for bytes in [gcode(), gzip(&gcode())] {
+            let file = Scratch::new("again.gcode", &bytes);
+            let mut input = Input::repeated(&file.0, 3).unwrap();
+            let mut all = Vec::new();
+            while let chunk = input.next(1000).unwrap()
+                && !chunk.is_empty()
+            {
+                all.extend_from_slice(chunk);
+            }
+            let one = gcode();
+            assert!(all == [&one[..], b"\n", &one, b"\n", &one].concat());
+            assert_eq!((input.size(), input.position()), (3 * bytes.len() as u64, 3 * bytes.len() as u64));
         }
     }
 

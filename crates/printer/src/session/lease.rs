@@ -91,11 +91,6 @@ impl Lease {
         self.told.is_some()
     }
 
-    /// Whether the board has nothing of a run yet that it could come to rest on.
-    pub(super) fn is_at_start(&self) -> bool {
-        self.told.is_some_and(|told| told.at_start)
-    }
-
     /// The board says nothing of its motion for too long: asks it. Whether that is so.
     pub(super) fn is_in_doubt(&mut self, board: &mut Board, now: Seconds) -> bool {
         let clock_now = board.clock_at(now);

@@ -99,6 +99,9 @@ pub(crate) struct Bench {
     fed: usize,
     /// The session is not called.
     pub(crate) stalled: bool,
+    /// What the host writes stays on its way, for as long as this holds.
+    pub(crate) is_line_stuck: bool,
+    to_board: Vec<u8>,
     to_host: Vec<u8>,
     /// The job's journal, as it is kept.
     pub(crate) journal: String,
@@ -126,6 +129,8 @@ impl Bench {
             feed_max: usize::MAX,
             fed: 0,
             stalled: false,
+            is_line_stuck: false,
+            to_board: Vec::new(),
             to_host: Vec::new(),
             journal: String::new(),
         }
@@ -193,12 +198,14 @@ impl Bench {
 
     /// Calls the session until it has nothing more to do now.
     fn attend(&mut self) -> Seconds {
-        let mut bytes = Vec::new();
         loop {
-            let wake = self.session.poll(self.now(), &mut bytes);
+            let now = self.now();
+            let wake = self.session.poll(now, &mut self.to_board);
             self.journal += &self.session.take_journal();
-            self.printer.write(&bytes);
-            bytes.clear();
+            if !self.is_line_stuck {
+                self.printer.write(&self.to_board);
+                self.to_board.clear();
+            }
             self.take_events();
             if !self.feed() {
                 return wake;

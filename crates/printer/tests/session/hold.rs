@@ -237,6 +237,38 @@ fn a_stall_where_nothing_is_leased_ends_as_it_would_without() {
     assert_eq!(holds(&bench), []);
 }
 
+/// What covers a run gets stuck on the line and comes after its begin: it only begins a little later, and nobody is asked.
+#[test]
+fn a_run_that_is_covered_late_begins_late() {
+    let setup = setup(BoardProfile::rp2040());
+    let file = format!("{START}G1 X20 F6000\nM109 S70\nG1 X140 F1200\n{END}");
+    let runs =
+        |bench: &Bench| bench.events.iter().filter(|event| matches!(event, Event::RunStarted { .. })).count();
+    let on_its_way = || {
+        let mut bench = setup.ready();
+        bench.start(&file);
+        let homed = |event: &Event| matches!(event, Event::Homed { axis: 2, .. });
+        bench.until("homed", 100.0, |bench| bench.events.iter().any(homed));
+        let known = runs(&bench);
+        bench.until("the last run", 100.0, |bench| runs(bench) == known + 2);
+        bench
+    };
+    let mut began_late = 0;
+    for hundredths in 0..28 {
+        let mut bench = on_its_way();
+        bench.run(0.01 * f64::from(hundredths));
+        bench.is_line_stuck = true;
+        bench.run(0.35);
+        bench.is_line_stuck = false;
+        bench.job_over();
+        bench.job_done();
+        assert_eq!((holds(&bench), bench.errors()), (vec![], vec![]), "{hundredths}");
+        assert!(bench.state().motors.iter().all(|motor| motor.lost.0 == 0));
+        began_late += usize::from(bench.printer.now() > bench.printer.motion_now());
+    }
+    assert!(began_late > 0, "{began_late}");
+}
+
 /// Stalls at every stage of a print's end, also such as outlast half the range of the board's 32-bit clock and all of it:
 /// the print is whole whatever happens.
 #[test]

@@ -3,6 +3,7 @@
 //! The file is checked, as a user's would be before a print; then a session prints it on a simulated board, while the
 //! same file, read a second time, says what the pulses should draw.
 
+mod course;
 mod digest;
 mod gcode_path;
 mod lease_tap;
@@ -38,6 +39,9 @@ use crate::{
 /// The most findings of the check that are shown one by one.
 const FINDINGS_SHOWN_MAX: usize = 20;
 
+/// The number of the print in its journal.
+const JOURNAL: u32 = 1;
+
 /// Runs the command.
 pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
     let config = config_file::load(&args.config)?;
@@ -45,7 +49,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
     let options = JobOptions {
         confirmed_lines: args.confirm_lines.iter().copied().collect::<BTreeSet<u32>>(),
         confirm_all: args.confirm_all,
-        journal: None,
+        journal: Some(JOURNAL),
         start_line: None,
     };
     let setup = Setup {
@@ -61,7 +65,10 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
         time_max: None,
         quiet: false,
     };
-    let mut simulation = Simulation::new(setup, Input::open(&args.file)?, Input::open(&args.file)?)?;
+    let mut simulation = {
+        let input = || Input::repeated(&args.file, args.repeat);
+        Simulation::new(setup, input()?, input()?)?
+    };
     if let Some(refusal) = Refusal::of(&found, &options) {
         refusal.show();
         let mut report = simulation.into_report();

@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, fmt::Write as _};
 use printer::machine::MOTOR_NAMES;
 use serde::Serialize;
 
+use super::course::Hour;
 use crate::console::{self, ErrorReport};
 
 /// How a simulated print ended.
@@ -62,6 +63,8 @@ pub(crate) struct Report {
     /// How often the board brought its motion to rest because its host was held up.
     pub(crate) holds: u32,
     pub(crate) after: After,
+    /// Hour by hour.
+    pub(crate) course: Vec<Hour>,
 }
 
 /// One motor's share.
@@ -136,7 +139,26 @@ impl Report {
             self.speed_ratio,
             self.pulse_digest
         );
+        self.course_text(&mut text);
         text
+    }
+
+    /// Where it took longer than an hour.
+    fn course_text(&self, text: &mut String) {
+        if self.course.len() < 2 {
+            return;
+        }
+        let _ = writeln!(text, "Until h   memory KiB   journal KiB   queued least, most s   clock off us");
+        for hour in &self.course {
+            let memory = hour.memory_kib.map_or_else(|| "-".to_owned(), |kib| kib.to_string());
+            let seconds = |of: Option<f64>| of.map_or_else(|| "-".to_owned(), |s| format!("{s:.2}"));
+            let (least, most) = (seconds(hour.queued_min_s), seconds(hour.queued_max_s));
+            let _ = writeln!(
+                text,
+                "{:>7.2} {memory:>12} {:>13} {least:>12} {most:>9} {:>14.1}",
+                hour.until_h, hour.journal_kib, hour.clock_error_max_us
+            );
+        }
     }
 }
 
@@ -172,6 +194,7 @@ mod tests {
             pauses: 0,
             holds: 0,
             after: After::default(),
+            course: vec![Hour::default(); 2],
         }
     }
 

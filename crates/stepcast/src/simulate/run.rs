@@ -16,6 +16,7 @@ use units::{Celsius, Hertz, Seconds, Ticks};
 use virtual_printer::{BoardProfile, Faults, HeaterView, HostStall, State, VirtualPrinter};
 
 use super::{
+    course::Course,
     lease_tap::LeaseTap,
     observer::{Observer, Wish},
     own_error,
@@ -170,6 +171,7 @@ pub(crate) struct Simulation {
     standby: [(&'static str, Celsius); 2],
     lease: LeaseTap,
     aftermath: Aftermath,
+    course: Course,
     next_sample: Ticks,
     seed: u64,
     path_error_max_mm: f64,
@@ -230,6 +232,7 @@ impl Simulation {
             standby,
             lease: LeaseTap::default(),
             aftermath: Aftermath { start, ..Aftermath::default() },
+            course: Course::default(),
             next_sample: start,
             seed,
             path_error_max_mm: PATH_ERROR_MAX_MM.max((x * x + y * y + z * z).sqrt()),
@@ -293,7 +296,11 @@ impl Simulation {
             let acted = self.take_events(now) | self.consent(now);
             let fed = self.feed()?;
             if !acted && !fed {
-                self.observer.queued(self.session.motion_queued(now));
+                let queued = self.session.motion_queued(now);
+                self.observer.queued(queued);
+                if let Some(ahead) = queued {
+                    self.course.queued(ahead);
+                }
                 let consent = self.consent_at.map(|at| self.clock.at(at));
                 return Ok(consent.map_or(wake, |consent| wake.min(consent)));
             }
@@ -427,11 +434,23 @@ impl Simulation {
             self.aftermath.overheated = now;
         }
         let time = self.clock.at(now);
+        self.follow(motion_now, time);
         if self.stage == Stage::Printing
             && let Some(nozzle) = state.heaters.iter().find(|heater| heater.name == MOTOR_NAMES[EXTRUDER])
         {
             self.observer.nozzle.sample(time, nozzle.temperature, extruding);
         }
+    }
+
+    /// How the host's idea of the board's clock fares, and what else may not grow.
+    fn follow(&mut self, motion_now: Ticks, time: Seconds) {
+        if self.away_until().is_none()
+            && let Some(believed) = self.session.motion_clock(time)
+        {
+            let error = believed.0 as f64 - motion_now.0 as f64;
+            self.course.clock_error(Seconds(error / f64::from(self.printer.profile().clock.0)));
+        }
+        self.course.pass(self.virtual_time(), self.journal.len());
     }
 
     /// Until when the host does nothing, if it is held up now or gone.
@@ -549,6 +568,7 @@ impl Simulation {
             pauses: self.observer.pauses,
             holds: self.observer.holds,
             after: self.after,
+            course: self.course.finish(virtual_time, self.journal.len()),
             motors,
         }
     }

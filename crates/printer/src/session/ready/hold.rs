@@ -146,8 +146,10 @@ impl Ready {
             && at_rest
             && matches!(hold.phase, Phase::Slowing)
         {
-            if hold.reason == HoldReason::QueueDry && self.lease.is_at_start() {
-                // Its run has yet to begin: it only begins a little later.
+            let motion_now = self.board.motion_at(now);
+            let has_begun = self.stream.run().is_none_or(|run| motion_now > run.start);
+            if hold.reason == HoldReason::QueueDry && !has_begun {
+                // What covers the run did not get there in time for its begin: it only begins a little later.
                 hold.phase = Phase::Resuming(None);
                 return;
             }
@@ -261,7 +263,7 @@ impl Ready {
                 self.events.push(Event::Held(hold_error(hold.reason, self.calls.gap.take())));
             }
             Some(_) => {}
-            None if matches!(self.wait, Wait::Heat) => {
+            None if matches!(self.wait, Wait::Free | Wait::Heat) => {
                 self.wait = Wait::Nothing;
                 if let Some(job) = &mut self.job {
                     job.state = JobState::Paused;
