@@ -85,14 +85,6 @@ test('an interrupted print goes on behind what is known to be made', () => {
   expect(lineAfter({ ...PRINT, line: 100 })).toBe(100);
 });
 
-test('a measured Z is near one of the places where the motor can stand', () => {
-  expect(nearestPlace(AT, 0.47)).toBeCloseTo(0.4, 9);
-  expect(nearestPlace(AT, 0.49)).toBeCloseTo(0.56, 9);
-  expect(nearestPlace(AT, 10.01)).toBeCloseTo(10, 9);
-  expect(nearestPlace({ ...AT, zPlaces: [] }, 1)).toBeNull();
-  expect(nearestPlace({ ...AT, zPitch: mm(0) }, 1)).toBeNull();
-});
-
 const NOW: Snapshot = { ...new FakeSession().snapshot(), wakeUps: { missed: 0, latest: seconds(0) } };
 const START = { line: 57, position: [mm(1), mm(2), mm(0.4)], clearZ: mm(2.4) } as const;
 
@@ -138,6 +130,34 @@ test('it may go on once Z is known and the user has looked at the part', () => {
   expect(start.starting.value?.place.line).toBe(57);
   show({ job: 'printing' });
   expect(start.starting.value).toBeNull();
+});
+
+test('a measured Z is near one of the places where the motor can stand, wherever it was moved meanwhile', () => {
+  const near = (known: number | null, measured: number): number =>
+    nearestPlace(start.placeNear(AT, known) ?? Number.NaN, AT.zPitch, measured);
+  const begun = { place: placeOf(plan, 57), at: AT };
+  start.begin(begun.place, AT);
+  expect(near(null, 0.47)).toBeCloseTo(0.4, 9);
+  expect(near(null, 0.49)).toBeCloseTo(0.56, 9);
+  // Taken for the first of them, moved up by 10 mm, and measured there.
+  start.noteZ(begun, null, 0.4);
+  expect(near(10.4, 10.5)).toBeCloseTo(10.56, 9);
+  start.noteZ(begun, 10.4, 10.56);
+  expect(near(10.56, 10.41)).toBeCloseTo(10.4, 9);
+  // Whoever takes it for something else between them can still get back to them.
+  start.noteZ(begun, 10.56, 10.5);
+  expect(near(10.5, 10.5)).toBeCloseTo(10.56, 9);
+  expect(near(0.5, 0.5)).toBeCloseTo(0.56, 9);
+});
+
+test('where nothing is known of such places none is named', () => {
+  const blind = { ...AT, zPlaces: [] };
+  expect(start.placeNear(null, 1)).toBeNull();
+  expect(start.placeNear(blind, null)).toBeNull();
+  start.begin(placeOf(plan, 57), blind);
+  start.noteZ({ place: placeOf(plan, 57), at: blind }, null, 3);
+  expect(start.placeNear(blind, 3)).toBeNull();
+  expect(start.placeNear({ ...AT, zPitch: mm(0) }, null)).toBeNull();
 });
 
 test('a pause later on is one like any other', () => {

@@ -85,6 +85,8 @@ interface NumberFieldProps {
   readonly hideLabel?: boolean;
   /** Told whether what is typed cannot be set. Then it stays, with what is wrong with it, when the field is left. */
   readonly onWrong?: (isWrong: boolean) => void;
+  /** Told of each number as it is typed, not only once the field is left. */
+  readonly live?: boolean;
   /** What is set acts on the machine: only Enter and the button pass it on, and leaving the field puts it away. */
   readonly acts?: boolean;
   /** Called with a number between `min` and `max`: on Enter, and, unless it `acts`, on leaving the field after a change. */
@@ -132,7 +134,7 @@ function useDraft({ value, min, max, acts, onWrong, onSet }: NumberFieldProps, i
 
 /** A number to type, with its unit; what is no number, or out of range, is said and not passed on. */
 export function NumberField(props: NumberFieldProps): JSX.Element {
-  const { label, unit, value, min, max, decimals = 0, disabled, why, hideLabel, acts } = props;
+  const { label, unit, value, min, max, decimals = 0, disabled, why, hideLabel, acts, live, onSet } = props;
   const id = useId();
   const isOff = Boolean(disabled || why);
   const { text, isWrong, set, commit, leave } = useDraft(props, isOff);
@@ -160,7 +162,12 @@ export function NumberField(props: NumberFieldProps): JSX.Element {
           aria-invalid={isWrong}
           aria-describedby={isWrong ? `${id}-hint` : undefined}
           onFocus={(event) => event.currentTarget.select()}
-          onInput={(event) => set(event.currentTarget.value)}
+          onInput={(event) => {
+            const typed = event.currentTarget.value;
+            set(typed);
+            const number = live ? parseNumber(typed) : undefined;
+            if (number !== undefined && number >= min && number <= max) onSet(number);
+          }}
           onKeyDown={(event) => {
             if (event.key === 'Enter') {
               event.preventDefault();

@@ -4,7 +4,15 @@ import { signal } from '@preact/signals';
 import type { ComponentChildren, JSX } from 'preact';
 import type { Interruption } from '../machine/protocol';
 import { snapshot, wish } from '../state/machine';
-import { isPartThere, isToBegin, nearestPlace, type Starting, starting } from '../state/start';
+import {
+  isPartThere,
+  isToBegin,
+  nearestPlace,
+  noteZ,
+  placeNear,
+  type Starting,
+  starting,
+} from '../state/start';
 import { mm } from '../units';
 import { Icon } from './icons';
 import { machineSummary } from './machine_summary';
@@ -14,6 +22,8 @@ import { Button, Choice, NumberField } from './parts';
 const Z = 2;
 /** A sheet of paper. */
 const PAPER_MM = 0.1;
+/** Nearer than this is the same. */
+const NEAR_MM = 0.005;
 
 /** What is typed for Z; null: what is proposed. */
 const typedZ = signal<{ readonly of: Starting; readonly z: number } | null>(null);
@@ -46,46 +56,63 @@ function Step({ title, isDone, children }: StepProps): JSX.Element {
 
 const millimetres = (z: number): string => `${formatNumber(z, 2)} mm`;
 
+interface WhereProps {
+  readonly at: Interruption;
+  /** What the user has said so far. */
+  readonly typed: number | null;
+}
+
 /** What the file, the journal and the motor say of Z. */
-function WhereZWas({ at, value }: { readonly at: Interruption; readonly value: number }): JSX.Element | null {
-  const { zRange, zPlaces, zError } = at;
+function WhereZWas({ at, typed }: WhereProps): JSX.Element {
+  const { zRange, zPlaces, zPitch, zError } = at;
   if (!zRange) return <p>Z was being moved by hand or homed when the print was interrupted: measure it.</p>;
   const [low, high] = zRange;
   const was =
-    high - low < 0.005 ? `at ${millimetres(low)}` : `between ${millimetres(low)} and ${millimetres(high)}`;
+    high - low < NEAR_MM ? `at ${millimetres(low)}` : `between ${millimetres(low)} and ${millimetres(high)}`;
   if (zPlaces.length === 0)
     return (
       <p>
         Z was {was}. It may stand up to {millimetres(zError)} from there now: measure it.
       </p>
     );
-  const nearest = nearestPlace(at, value);
-  const isOff = nearest !== null && Math.abs(nearest - value) > 0.005;
+  const isOne = zPlaces.length === 1;
+  const doubt = zError >= NEAR_MM ? `, give or take ${millimetres(zError)}` : '';
   return (
     <>
       <p>
         Z was {was}. With current again its motor stands at{' '}
-        {zPlaces.length === 1 ? millimetres(zPlaces[0] ?? 0) : 'one of these places, the likeliest first'},
-        unless the head has sunk{zError >= 0.005 && `; give or take ${millimetres(zError)}`}.
+        {isOne ? millimetres(zPlaces[0] ?? 0) : `one of these places, ${millimetres(zPitch)} apart`}
+        {doubt}, unless the head has sunk.
+        {!isOne && ' Choose one: the likeliest is first. If in doubt, measure.'}
       </p>
-      {zPlaces.length > 1 && (
+      {!isOne && (
         <Choice
           label="Places where Z can stand"
           hideLabel
           choices={zPlaces.map((place, value) => ({ value, text: millimetres(place) }))}
-          value={zPlaces.indexOf(nearest ?? mm(Number.NaN))}
-          onSet={(index) => type(zPlaces[index] ?? value)}
+          value={zPlaces.findIndex((place) => typed !== null && Math.abs(place - typed) < NEAR_MM)}
+          onSet={(index) => type(zPlaces[index] ?? 0)}
         />
       )}
-      {isOff && (
-        <p class="row wrap hint">
-          <span>
-            The motor can stand at {millimetres(nearest)}, not at {millimetres(value)}.
-          </span>
-          <Button onClick={() => type(nearest)}>Take {millimetres(nearest)}</Button>
-        </p>
-      )}
     </>
+  );
+}
+
+interface NearestProps {
+  readonly base: number;
+  readonly pitch: number;
+  readonly value: number;
+}
+
+/** Below the button, which must not move while it is pressed. */
+function Nearest({ base, pitch, value }: NearestProps): JSX.Element | null {
+  const nearest = nearestPlace(base, pitch, value);
+  if (Math.abs(nearest - value) <= NEAR_MM) return null;
+  return (
+    <div class="row wrap">
+      <span class="hint">As far as is known, the motor stands at {millimetres(nearest)} then.</span>
+      <Button onClick={() => type(nearest)}>Take {millimetres(nearest)}</Button>
+    </div>
   );
 }
 
@@ -102,8 +129,12 @@ function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
   const proposed = known ?? at?.zPlaces[0] ?? at?.zRange?.[0] ?? place.top;
   const typed = typedZ.value?.of === begun ? typedZ.value.z : null;
   const value = Math.min(Math.max(typed ?? proposed, min), max);
+  const base = placeNear(at, known);
+  const isSaid = known !== null || typed !== null || at?.zPlaces.length === 1;
   const say = async (): Promise<void> => {
-    if (await wish({ kind: 'set-position', axis: 'Z', position: mm(value) })) typedZ.value = null;
+    if (!(await wish({ kind: 'set-position', axis: 'Z', position: mm(value) }))) return;
+    noteZ(begun, known, value);
+    typedZ.value = null;
   };
   return (
     <Step title="Where Z stands" isDone={known !== null}>
@@ -112,7 +143,7 @@ function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
       ) : (
         <p>Taken to stand at {millimetres(known)}. Where that is not so, correct it.</p>
       )}
-      {at && known === null && <WhereZWas at={at} value={value} />}
+      {at && known === null && <WhereZWas at={at} typed={typed} />}
       <p class="hint">
         To measure: say what is likely, then move Z under Motion until a sheet of paper just slides. On the
         bed, beside the part, that is {formatNumber(PAPER_MM, 1)} mm; on top of the part{' '}
@@ -126,12 +157,18 @@ function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
           min={min}
           max={max}
           decimals={3}
+          live
           onSet={type}
         />
-        <Button kind={known === null ? 'primary' : 'plain'} onClick={() => void say()}>
+        <Button
+          kind={known === null ? 'primary' : 'plain'}
+          why={isSaid ? null : 'Type where Z stands first.'}
+          onClick={() => void say()}
+        >
           {known === null ? 'Z stands there' : 'Correct Z'}
         </Button>
       </div>
+      {base !== null && typed !== null && <Nearest base={base} pitch={at?.zPitch ?? 0} value={value} />}
     </Step>
   );
 }

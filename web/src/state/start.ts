@@ -74,14 +74,27 @@ export function lineAfter(
   return next === null ? null : Math.min(next, facts.lines);
 }
 
-/** Of the places where Z can stand the one that is nearest to where it was measured; null where nothing is known of them. */
-export function nearestPlace({ zPlaces, zPitch }: Interruption, measured: number): Mm | null {
-  const [first] = zPlaces;
-  if (first === undefined || !(zPitch > 0)) return null;
-  return mm(first + Math.round((measured - first) / zPitch) * zPitch);
-}
+/** Of places that are `pitch` apart, `base` among them, the one that is nearest to where Z was measured. */
+export const nearestPlace = (base: number, pitch: number, measured: number): Mm =>
+  mm(base + Math.round((measured - base) / pitch) * pitch);
 
 export const starting = signal<Starting | null>(null);
+/** Added to what Z is taken for it gives one of the places where its motor can stand; null where those are not known. */
+const placeOffset = signal<number | null>(null);
+
+/** One of the places where Z's motor can stand now; null where nothing is known of them. `known` is what Z is taken for. */
+export function placeNear(at: Interruption | null, known: number | null): number | null {
+  if (!at || !(at.zPitch > 0)) return null;
+  if (known === null) return at.zPlaces[0] ?? null;
+  return placeOffset.value === null ? null : known + placeOffset.value;
+}
+
+/** The user says where Z stands, where it was taken to stand at `known` before. The places themselves stay where they are. */
+export function noteZ({ at }: Starting, known: number | null, said: number): void {
+  const place = placeNear(at, known);
+  placeOffset.value = place === null ? null : place - said;
+}
+
 /** The user says that the part is where it was. */
 export const isPartThere = signal(false);
 
@@ -113,5 +126,6 @@ export function followStart(): void {
 /** A print is begun in the middle of its file. */
 export function begin(place: Place, at: Interruption | null): void {
   isPartThere.value = false;
+  placeOffset.value = null;
   starting.value = { place, at };
 }

@@ -1,6 +1,6 @@
 // The question where a print is to begin: for the file that is shown, or for an interrupted print whose board has
 // forgotten it. Finds that print's file and shows it. Begins nothing and moves nothing.
-import { effect, signal } from '@preact/signals';
+import { effect, signal, untracked } from '@preact/signals';
 import type { Interruption, KeptFile, KeptPrint, Trouble } from '../machine/protocol';
 import { confirmAgain } from './confirm';
 import { keptFile } from './machine';
@@ -50,6 +50,7 @@ export function followStartRequest(): void {
     const request = startRequest.value;
     if (request?.kind !== 'shown' && request?.kind !== 'lost') return;
     if (file.value?.blob !== request.blob) startRequest.value = null;
-    else if (request.kind === 'lost' && summary.value) confirmAgain(request.lost.confirmedLines);
+    else if (request.kind === 'lost' && summary.value)
+      untracked(() => confirmAgain(request.lost.confirmedLines));
   });
 }
