@@ -3,11 +3,14 @@
 //! One thing at a time: G-code comes from the job or from the console, and a barrier in it (homing, a wait) is dealt
 //! with before anything that follows.
 
+mod drop;
 mod ending;
 mod hold;
+mod pause;
 mod plan;
 mod start;
 mod take_up;
+mod take_up_parked;
 mod waiting;
 
 use gcode::LineNumber;
@@ -33,6 +36,7 @@ use super::{
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
+    journal::Input,
     machine,
     planner::{Planner, Source, TimedAction},
 };
@@ -275,6 +279,10 @@ impl Ready {
             return self.advance_hold(now);
         }
         let motion_now = self.board.motion_at(now);
+        self.stream.forget_made(motion_now, &self.board);
+        if !self.plans_nothing() {
+            self.stream.send_again(&mut self.board, now);
+        }
         while let Some(due) = self.stream.pop_due(motion_now) {
             self.on_due(due, now);
         }
@@ -311,6 +319,14 @@ impl Ready {
         }
     }
 
+    /// What heaters and fan have been set to before a job begins holds until its file says something else.
+    pub(super) fn note_preheating(&mut self) {
+        for (heater, target) in self.thermal.wanted() {
+            self.diary.target(heater, target.0);
+        }
+        self.diary.input(Input::Fan(self.thermal.fan_speed()));
+    }
+
     /// Whether a job that has been ended may still do this: what was read of it ahead must not switch anything on.
     fn is_allowed(&self, action: &TimedAction) -> bool {
         let is_ending = self.job.as_ref().is_some_and(Job::is_ending);
@@ -331,7 +347,12 @@ impl Ready {
                 }
             }
             TimedAction::TurnOffHeaters => self.thermal.all_off(&mut self.board, now),
-            TimedAction::Fan { speed, .. } => self.thermal.set_fan(speed, None, &mut self.board, now),
+            TimedAction::Fan { speed, .. } => {
+                if !self.plans_job() {
+                    self.diary.input(Input::Fan(speed));
+                }
+                self.thermal.set_fan(speed, None, &mut self.board, now);
+            }
             TimedAction::Message(text) => self.events.push(Event::Message(text)),
             TimedAction::Annotation(annotation) => self.events.push(Event::Annotation(annotation)),
             TimedAction::Object(object) => self.events.push(Event::Object(object)),
