@@ -40,7 +40,8 @@ function problemOf(item: string): string | null {
       ? null
       : `needs a number of seconds that it lasts, as in ${name}=5@60`;
   const parts = PARTS[name];
-  if (!parts) return `is not known; there are ${listed([...Object.keys(PARTS), ...CABLE, ...LASTING, ...BYTES])}`;
+  if (!parts)
+    return `is not known; there are ${listed([...Object.keys(PARTS), ...CABLE, ...LASTING, ...BYTES])}`;
   return value !== undefined && parts.includes(value) ? null : `needs one of ${listed(parts)} after =`;
 }
 
