@@ -91,6 +91,7 @@ fn motor(
         step_distance: config.step_distance(),
         start,
         frame,
+        sag: Mm::ZERO,
     }
 }
 

@@ -167,6 +167,33 @@ impl Arc {
         Mm((around * around + rise * rise + inward * inward).sqrt())
     }
 
+    /// The lowest and highest X, Y, Z that it goes through, mm.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        const QUARTER: f64 = PI / 2.0;
+        let [first, second, _] = self.plane.axes();
+        let (from, to) = (self.from.to_array(), self.to.to_array());
+        let mut low: [f64; 3] = core::array::from_fn(|axis| from[axis].min(to[axis]));
+        let mut high: [f64; 3] = core::array::from_fn(|axis| from[axis].max(to[axis]));
+        let start = angle_of([from[first], from[second]], self.centre);
+        let end = start + self.angle;
+        let [r0, r1] = self.radii();
+        let radius = r0.max(r1);
+        // It is farthest out where it meets an axis, of which there are four; the fifth is the first again.
+        let quarter = libm::ceil(start.min(end) / QUARTER);
+        for turn in [0.0, 1.0, 2.0, 3.0] {
+            if (quarter + turn) * QUARTER <= start.max(end) {
+                let (sin, cos) = libm::sincos((quarter + turn) * QUARTER);
+                for (axis, at) in
+                    [(first, self.centre[0] + radius * cos), (second, self.centre[1] + radius * sin)]
+                {
+                    low[axis] = low[axis].min(at);
+                    high[axis] = high[axis].max(at);
+                }
+            }
+        }
+        [low, high]
+    }
+
     /// Straight moves that stay within `tolerance` of the arc and end exactly where it does.
     pub fn chords(&self, tolerance: Mm) -> Chords {
         let [r0, r1] = self.radii();

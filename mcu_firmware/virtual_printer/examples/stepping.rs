@@ -20,6 +20,7 @@ fn machine() -> Machine {
         step_distance: Mm(0.0125),
         start: Mm(0.0),
         frame: None,
+        sag: Mm(0.0),
     };
     Machine { motors: (0..MOTORS).map(motor).collect(), ..Machine::default() }
 }

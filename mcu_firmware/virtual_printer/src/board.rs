@@ -56,6 +56,8 @@ pub(crate) struct Axis {
     pub(crate) pulses: u64,
     pub(crate) step_mm: f64,
     pub(crate) start_mm: f64,
+    /// By how much it sinks without power, in microsteps.
+    pub(crate) sag: f64,
 }
 
 /// A switch, as wired.
@@ -117,6 +119,8 @@ pub(crate) struct SimulatedBoard<R> {
     conversion_ticks: u64,
     noise: Random,
     pub(crate) up: Pipe,
+    /// The machine has power.
+    pub(crate) powered: bool,
     /// The cable is in.
     pub(crate) plugged: bool,
     /// Something was sent since the event loop looked.
@@ -143,6 +147,7 @@ impl<R: Recorder> SimulatedBoard<R> {
             conversion_ticks: (CONVERSION_S * f64::from(profile.clock.0)) as u64,
             noise,
             up,
+            powered: true,
             plugged: true,
             sent: false,
             restart_wanted: false,
@@ -158,7 +163,7 @@ impl<R: Recorder> SimulatedBoard<R> {
         self.conversion = None;
         let now = self.clock;
         for axis in &mut self.axes {
-            axis.motor.energise(now, axis.enable_inverted.is_none());
+            axis.motor.energise(now, self.powered && axis.enable_inverted.is_none());
             if axis.step_active {
                 axis.step_active = false;
             }
@@ -168,6 +173,24 @@ impl<R: Recorder> SimulatedBoard<R> {
         }
         for meter in self.fans.iter_mut().map(|fan| &mut fan.meter) {
             meter.set(now, false);
+        }
+    }
+
+    /// The machine's power is gone.
+    pub(crate) fn lose_power(&mut self) {
+        self.powered = false;
+        self.restart_wanted = true;
+        for axis in &mut self.axes {
+            axis.motor.lose_power(self.clock, axis.sag);
+        }
+    }
+
+    /// The machine's power is back.
+    pub(crate) fn regain_power(&mut self, chance: &mut Random) {
+        self.powered = true;
+        for axis in &mut self.axes {
+            axis.motor.regain_power(self.clock, chance.chance(0.5));
+            axis.motor.energise(self.clock, axis.enable_inverted.is_none());
         }
     }
 

@@ -60,6 +60,10 @@ pub enum FailureKind {
     Replug,
     /// The board starts anew, as after a dip of its supply: all pins are let go, and it knows nothing of before.
     BoardReset,
+    /// The machine has no power any more: as a reset, and all motors and heaters are without current.
+    PowerLoss,
+    /// The power is back.
+    PowerReturn,
     /// The heater's sensor has come off: the converter reads full scale.
     SensorOpen(String),
     /// The heater's sensor is short-circuited: the converter reads zero.
@@ -76,7 +80,7 @@ pub enum FailureKind {
 
 /// The items that [`Faults`] reads, for help texts.
 pub const FAULT_ITEMS: &str = "corrupt=P (another byte), flip=P (one bit), drop=P, duplicate=P, delay=P (probability per \
-    byte), unplug@T, replug@T, outage=SECONDS@T (both), board-reset@T, sensor-open=HEATER@T, sensor-short=HEATER@T, heater-dead=HEATER@T, heater-stuck-on=HEATER@T, \
+    byte), unplug@T, replug@T, outage=SECONDS@T (both), board-reset@T, power-loss=SECONDS@T (and back), sensor-open=HEATER@T, sensor-short=HEATER@T, heater-dead=HEATER@T, heater-stuck-on=HEATER@T, \
     endstop-stuck-on=AXIS@T, endstop-stuck-off=AXIS@T, host-stall=SECONDS@T (T: seconds since power-up, 0 when left out)";
 
 /// Why a fault cannot be read.
@@ -125,14 +129,19 @@ fn parse_item(item: &str) -> Result<Faults, &'static str> {
         *of_bytes = parse_probability(value.ok_or("the probability is missing")?)?;
         return Ok(faults);
     }
-    if matches!(name, "host-stall" | "outage") {
+    if matches!(name, "host-stall" | "outage" | "power-loss") {
         let lasts = parse_duration(value.ok_or("the duration is missing")?)?;
         let at = at.unwrap_or(Seconds::ZERO);
         if name == "host-stall" {
             faults.host_stalls.push(HostStall { at, lasts });
         } else {
-            faults.failures.push(Failure { at, kind: FailureKind::Unplug });
-            faults.failures.push(Failure { at: at + lasts, kind: FailureKind::Replug });
+            let [gone, back] = if name == "outage" {
+                [FailureKind::Unplug, FailureKind::Replug]
+            } else {
+                [FailureKind::PowerLoss, FailureKind::PowerReturn]
+            };
+            faults.failures.push(Failure { at, kind: gone });
+            faults.failures.push(Failure { at: at + lasts, kind: back });
         }
         return Ok(faults);
     }
@@ -251,6 +260,9 @@ mod tests {
             [(10.0, FailureKind::Unplug), (11.5, FailureKind::Replug), (20.0, FailureKind::BoardReset)];
         assert_eq!(outage.failures, expected.map(|(at, kind)| Failure { at: Seconds(at), kind }));
         faults += outage;
+        let gone: Faults = "power-loss=60@7".parse().expect("a fault");
+        let expected = [(7.0, FailureKind::PowerLoss), (67.0, FailureKind::PowerReturn)];
+        assert_eq!(gone.failures, expected.map(|(at, kind)| Failure { at: Seconds(at), kind }));
         assert_eq!((faults.bytes.corrupt, faults.bytes.flip), (0.01, 0.5));
     }
 
@@ -263,6 +275,7 @@ mod tests {
             ("sensor-open@3", "name is missing"),
             ("unplug=x@3", "no name"),
             ("outage@3", "missing"),
+            ("power-loss@3", "missing"),
             ("unplug@soon", "seconds"),
             ("fire", "no such fault"),
             ("host-stall@3", "missing"),

@@ -44,6 +44,8 @@ pub struct Motor {
     pub start: Mm,
     /// The stops of the frame, lower and upper.
     pub frame: Option<(Mm, Mm)>,
+    /// By how much the load sinks when the motor loses its power.
+    pub sag: Mm,
 }
 
 /// A limit switch.

@@ -5,12 +5,17 @@
 //! slips by whole electrical periods (four full steps) when the torque does not suffice. Steps are lost here by
 //! physics alone; nothing knows what a planner promised.
 //!
+//! Without current only the magnets of the rotor pull it, towards the nearest full step (the detent torque); where dry
+//! friction is stronger it stays where it is. A driver that gets its power back begins at the first place of its table of
+//! microsteps, wherever the rotor stands: that is the same for every fourth full step.
+//!
 //! `J·dω/dt = T(f)·sin(2π·(field − rotor)/period) − load − drag·ω − damping·(ω − ω_field) − dry friction`, with
 //! T(f) flat up to a corner speed and falling as 1/f beyond it, where the coils' inductance limits the current.
 //!
 //! Units: microsteps for angles, seconds for durations, ticks of the board's clock for points in time.
 //! Does not know: pins, millimetres (apart from the stops of the frame, given in microsteps), firmware.
-//! Source: the standard two-phase hybrid motor model (Acarnley, "Stepping Motors", ch. 4 and 5); leapfrog integration
+//! Sources: the datasheets of the TMC2209 (MSCNT, the place in the table, is 0 after reset) and of the A4988 (home state);
+//! the standard two-phase hybrid motor model (Acarnley, "Stepping Motors", ch. 4 and 5); leapfrog integration
 //! of second order with the field's mean over each step of time.
 
 use crate::switch::Switch;
@@ -31,6 +36,9 @@ const LAG_PERIODS_FINE: f64 = 0.08;
 const FINER: u64 = 16;
 /// How fast the current, and with it the torque, follows the speed of the field: the coils' L/R.
 const CURRENT_TIME_CONSTANT_S: f64 = 0.001;
+/// A rotor this near to the middle between two places that its driver could pull it to, in electrical periods, is pulled by
+/// too little to overcome friction.
+const BALANCE_PERIODS: f64 = 0.04;
 /// Least dry friction: without any, a rotor would swing for ever.
 const FRICTION_NM_MIN: f64 = 1e-4;
 
@@ -55,6 +63,9 @@ pub struct Mechanics {
     pub damping_ratio: f64,
     /// Constant torque towards lower positions (gravity), in newton metres.
     pub load_nm: f64,
+    /// Greatest torque towards the nearest full step without current, in newton metres. With current it is part of the
+    /// holding torque.
+    pub detent_nm: f64,
 }
 
 const TURN_RAD: f64 = core::f64::consts::TAU;
@@ -76,6 +87,7 @@ impl Mechanics {
             drag_nm_s: 1e-4,
             damping_ratio: 0.1,
             load_nm: 0.0,
+            detent_nm: 0.02,
         }
     }
 
@@ -95,16 +107,22 @@ impl Mechanics {
         (self.holding_torque_nm * electrical_per_mechanical / self.inertia_kg_m2).sqrt()
     }
 
+    /// The same around a full step, without current.
+    fn detent_swing_rad_s(&self) -> f64 {
+        (self.detent_nm * f64::from(self.full_steps_per_rotation) / self.inertia_kg_m2).sqrt()
+    }
+
     /// Whether all values are finite and make a motor, one that [`TIME_STEP_US`] is short enough for.
     pub fn is_sound(&self) -> bool {
         let positive = [self.holding_torque_nm, self.corner_speed_rev_s, self.inertia_kg_m2];
-        let not_negative = [self.friction_nm, self.drag_nm_s, self.damping_ratio];
+        let not_negative = [self.friction_nm, self.drag_nm_s, self.damping_ratio, self.detent_nm];
         positive.iter().all(|v| v.is_finite() && *v > 0.0)
             && not_negative.iter().all(|v| v.is_finite() && *v >= 0.0)
             && self.load_nm.is_finite()
             && (4..=4000).contains(&self.full_steps_per_rotation)
             && (1..=256).contains(&self.microsteps)
             && self.swing_rad_s() * TIME_STEP_S < RATE_PER_STEP_MAX
+            && self.detent_swing_rad_s() * TIME_STEP_S < RATE_PER_STEP_MAX
             && 2.0 * self.damping_ratio * self.swing_rad_s() * TIME_STEP_S < RATE_PER_STEP_MAX
             && self.drag_nm_s / self.inertia_kg_m2 * TIME_STEP_S < RATE_PER_STEP_MAX
     }
@@ -120,6 +138,8 @@ struct Model {
     corner_rate: f64,
     friction: f64,
     load: f64,
+    detent: f64,
+    per_full_step: f64,
     drag_per_s: f64,
     damping_per_s: f64,
     damping_max: f64,
@@ -141,6 +161,8 @@ impl Model {
             corner_rate: mechanics.corner_speed_rev_s * mechanics.microsteps_per_rotation(),
             friction: acceleration(mechanics.friction_nm.max(FRICTION_NM_MIN)),
             load: acceleration(mechanics.load_nm),
+            detent: acceleration(mechanics.detent_nm),
+            per_full_step: 1.0 / f64::from(mechanics.microsteps),
             drag_per_s: mechanics.drag_nm_s / mechanics.inertia_kg_m2,
             damping_per_s: 2.0 * mechanics.damping_ratio * natural_rad_s,
             // Eddy currents damp swings; they do not drag a stalled rotor along.
@@ -288,6 +310,32 @@ impl MotorState {
         }
     }
 
+    /// The power is gone: no current, and what hangs on the motor sinks by this much.
+    pub(crate) fn lose_power(&mut self, now: u64, sag: f64) {
+        self.energise(now, false);
+        self.rotor = (self.rotor - sag).clamp(self.stops.min, self.stops.max);
+        self.settled = false;
+    }
+
+    /// The power is back: the driver begins at the first place of its table, and counts as standing at the nearest such
+    /// place from the rotor. One that stands in the middle between two goes where chance has it.
+    pub(crate) fn regain_power(&mut self, now: u64, upwards: bool) {
+        self.advance(now);
+        let turns = self.rotor * self.model.per_period;
+        let lag = wrapped(turns);
+        let mut place = turns - lag;
+        if 0.5 - lag.abs() < BALANCE_PERIODS {
+            // Not even friction keeps it there: the smallest shake is enough.
+            let sign = if upwards { 1.0 } else { -1.0 };
+            let middle = place + 0.5_f64.copysign(lag);
+            place = middle + 0.5 * sign;
+            self.rotor = (middle + BALANCE_PERIODS * sign) * self.model.period;
+        }
+        self.field = libm::rint(place * self.model.period) as i64;
+        (self.chunk_field, self.weight, self.rate) = (self.field, 0, 0.0);
+        self.settled = false;
+    }
+
     /// Integrates all chunks of time that end at or before `now`. Calling it more often changes nothing.
     #[inline]
     pub(crate) fn advance(&mut self, now: u64) {
@@ -363,6 +411,8 @@ impl MotorState {
             let pull =
                 if speed > model.corner_rate { model.pull * (model.corner_rate / speed) } else { model.pull };
             acceleration += pull * sin_turns((field - middle) * model.per_period);
+        } else {
+            acceleration -= model.detent * sin_turns(middle * model.per_full_step);
         }
         // What depends on the speed takes its value in the middle of the step.
         let speed = self.velocity + acceleration * (0.5 * dt);

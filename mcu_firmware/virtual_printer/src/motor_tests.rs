@@ -252,3 +252,76 @@ fn halving_the_time_step_changes_no_verdict() {
     assert!(close <= cases / 100, "{close} of {cases} too close to call");
     assert!(equal >= cases * 9 / 10, "{equal} of {cases} equal to the step");
 }
+
+/// A motor that stands on this many microsteps.
+fn standing(mechanics: &Mechanics, microsteps: i64) -> (MotorState, u64) {
+    let mut motor = motor(mechanics, TIME_STEP_US);
+    let mut clock = 1000;
+    for _ in 0..microsteps.abs() {
+        motor.step(clock, microsteps > 0);
+        clock += 60_000;
+    }
+    clock += 6_000_000;
+    motor.advance(clock);
+    (motor, clock)
+}
+
+const SECOND: u64 = CLOCK_HZ as u64;
+
+#[test]
+fn without_current_a_rotor_falls_to_the_nearest_full_step_unless_friction_holds_it() {
+    let loose = Mechanics { friction_nm: 0.0, detent_nm: 0.03, ..carriage() };
+    let full_step = i64::from(MICROSTEPS);
+    for at in [-21, -9, 0, 3, 7, 9, 16, 30] {
+        let (mut motor, clock) = standing(&loose, at);
+        motor.energise(clock, false);
+        motor.advance(clock + 2 * SECOND);
+        let nearest = (at as f64 / full_step as f64).round() * full_step as f64;
+        assert!((motor.rotor() - nearest).abs() < 0.5, "{at}: {}", motor.rotor());
+        // Its driver has not lost its place: it pulls the rotor back.
+        motor.energise(clock + 2 * SECOND, true);
+        motor.advance(clock + 3 * SECOND);
+        assert!((motor.rotor() - at as f64).abs() < 1.0 && motor.lost() == 0, "{at}: {}", motor.rotor());
+    }
+    let (mut motor, clock) = standing(&carriage(), 7);
+    motor.energise(clock, false);
+    motor.advance(clock + SECOND);
+    assert!((motor.rotor() - 7.0).abs() < 2.0, "{}", motor.rotor());
+}
+
+#[test]
+fn a_driver_that_gets_its_power_back_pulls_the_rotor_to_the_nearest_fourth_full_step() {
+    let period = 4 * i64::from(MICROSTEPS);
+    for friction_nm in [0.0, 0.03] {
+        let mechanics = Mechanics { friction_nm, detent_nm: 0.04, ..carriage() };
+        for at in [-130, -64, -50, -20, 0, 15, 22, 43, 64, 100] {
+            let (mut motor, clock) = standing(&mechanics, at);
+            motor.lose_power(clock, 0.0);
+            motor.advance(clock + SECOND);
+            motor.regain_power(clock + SECOND, true);
+            motor.energise(clock + SECOND, true);
+            motor.advance(clock + 2 * SECOND);
+            let nearest = (at as f64 / period as f64).round() as i64 * period;
+            assert_eq!((motor.field(), motor.lost()), (nearest, 0), "{at}");
+            // Friction leaves a lag.
+            assert!((motor.rotor() - nearest as f64).abs() < 2.0, "{at}: {}", motor.rotor());
+        }
+    }
+}
+
+#[test]
+fn a_rotor_between_two_places_goes_either_way_and_a_load_sinks() {
+    let mechanics = Mechanics { detent_nm: 0.04, ..carriage() };
+    let regained = |sag: f64, upwards: bool| {
+        let (mut motor, clock) = standing(&mechanics, 32);
+        motor.lose_power(clock, sag);
+        motor.advance(clock + SECOND);
+        motor.regain_power(clock + SECOND, upwards);
+        motor.energise(clock + SECOND, true);
+        motor.advance(clock + 2 * SECOND);
+        (motor.field(), (motor.rotor() - motor.field() as f64).abs() < 2.0)
+    };
+    assert_eq!((regained(0.0, true), regained(0.0, false)), ((64, true), (0, true)));
+    assert_eq!((regained(8.0, true), regained(-8.0, false)), ((0, true), (64, true)));
+    assert_eq!(regained(64.0, false), (-64, true));
+}

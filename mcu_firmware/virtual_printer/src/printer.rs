@@ -26,6 +26,8 @@ pub const OBJECTS_MAX: usize = 96;
 const TASK_RETRY_S: f64 = 0.0005;
 /// No event.
 const NEVER: u64 = u64::MAX;
+/// The end of a restart that waits for power.
+const WITHOUT_POWER: u64 = NEVER - 1;
 
 /// A simulated printer. See the module.
 pub struct VirtualPrinter<R: Recorder> {
@@ -44,6 +46,7 @@ pub struct VirtualPrinter<R: Recorder> {
     arrived: Vec<u8>,
     /// How far the motion clock is behind the board's.
     behind: u64,
+    balance: Random,
 }
 
 impl<R: Recorder> VirtualPrinter<R> {
@@ -89,6 +92,7 @@ impl<R: Recorder> VirtualPrinter<R> {
             failures: Vec::new(),
             arrived: Vec::new(),
             behind: 0,
+            balance: Random::new(seed, Source::Balance),
         };
         printer.schedule(&faults.failures)?;
         Ok(printer)
@@ -108,7 +112,11 @@ impl<R: Recorder> VirtualPrinter<R> {
 
     fn check_target(&self, kind: &FailureKind) -> Result<(), WiringError> {
         let (name, known) = match kind {
-            FailureKind::Unplug | FailureKind::Replug | FailureKind::BoardReset => return Ok(()),
+            FailureKind::Unplug
+            | FailureKind::Replug
+            | FailureKind::BoardReset
+            | FailureKind::PowerLoss
+            | FailureKind::PowerReturn => return Ok(()),
             FailureKind::SensorOpen(name)
             | FailureKind::SensorShort(name)
             | FailureKind::HeaterDead(name)
@@ -292,12 +300,16 @@ impl<R: Recorder> VirtualPrinter<R> {
         self.firmware = new_firmware(&self.board.profile);
         self.next_timer = NEVER;
         self.next_task = NEVER;
-        self.restart_at =
-            self.board.clock + self.board.profile.clock.ticks_in(self.board.profile.restart).0.max(1);
+        self.restart_at = if self.board.powered { self.restart_clock() } else { WITHOUT_POWER };
         if self.board.profile.link == LinkProfile::Usb {
             self.down.clear();
             self.board.up.clear();
         }
+    }
+
+    /// When a board that starts now has started.
+    fn restart_clock(&self) -> u64 {
+        self.board.clock + self.board.profile.clock.ticks_in(self.board.profile.restart).0.max(1)
     }
 
     fn start_firmware(&mut self) {
@@ -315,7 +327,13 @@ impl<R: Recorder> VirtualPrinter<R> {
                 self.board.up.clear();
             }
             FailureKind::Replug => self.board.plugged = true,
-            FailureKind::BoardReset => self.board.restart_wanted = true,
+            FailureKind::BoardReset => self.board.restart_wanted |= self.board.powered,
+            FailureKind::PowerLoss => self.board.lose_power(),
+            FailureKind::PowerReturn if self.board.powered => {}
+            FailureKind::PowerReturn => {
+                self.board.regain_power(&mut self.balance);
+                self.restart_at = self.restart_clock();
+            }
             FailureKind::SensorOpen(name) | FailureKind::SensorShort(name) => {
                 let reads = if matches!(kind, FailureKind::SensorOpen(_)) { ADC_MAX } else { 0 };
                 if let Some(index) = heater(name) {

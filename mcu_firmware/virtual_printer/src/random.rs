@@ -19,6 +19,8 @@ pub(crate) enum Source {
     LinkUp,
     /// Noise of the converter.
     Noise,
+    /// Where rotors go that could go either way.
+    Balance,
     /// Contact bounce of one switch.
     Bounce(u8),
 }
@@ -44,6 +46,7 @@ impl Random {
             Source::LinkDown => 3,
             Source::LinkUp => 4,
             Source::Noise => 5,
+            Source::Balance => 6,
             Source::Bounce(index) => 0x100 + u64::from(index),
         };
         Self(Pcg32::new(spread(seed ^ spread(stream)), stream))

@@ -86,7 +86,8 @@ fn wire_motor<R: Recorder>(
     let index = board.axes.len() as u8;
     let step_mm = motor.step_distance.0;
     let frame_is_sound = motor.frame.is_none_or(|(min, max)| min <= motor.start && motor.start <= max);
-    let length_is_sound = step_mm.is_finite() && step_mm > 0.0 && motor.start.0.is_finite();
+    let length_is_sound =
+        step_mm.is_finite() && step_mm > 0.0 && motor.start.0.is_finite() && motor.sag.0.is_finite();
     if !(motor.mechanics.is_sound() && length_is_sound && frame_is_sound) {
         return Err(WiringError::Unsound { part: motor.name.clone() });
     }
@@ -112,6 +113,7 @@ fn wire_motor<R: Recorder>(
         pulses: 0,
         step_mm,
         start_mm: motor.start.0,
+        sag: motor.sag.0 / step_mm,
     });
     Ok(())
 }

@@ -99,6 +99,16 @@ proptest! {
         prop_assert!((arc.angle.abs() - sweep).abs() < 1e-6);
         let mut last = from;
         let mut filament = 0.0;
+        let (mut low, mut high) = ([0, 1, 2].map(|_| f64::INFINITY), [0, 1, 2].map(|_| f64::NEG_INFINITY));
+        for chord in arc.chords(Mm(0.0005)) {
+            for end in [chord.from, chord.to] {
+                low = core::array::from_fn(|axis| low[axis].min(end.to_array()[axis]));
+                high = core::array::from_fn(|axis| high[axis].max(end.to_array()[axis]));
+            }
+        }
+        for (bounds, chords) in arc.bounds().iter().zip([low, high]) {
+            prop_assert!(bounds.iter().zip(chords).all(|(a, b)| (a - b).abs() < 0.001), "{bounds:?} {chords:?}");
+        }
         for chord in arc.chords(Mm(tolerance)) {
             prop_assert_eq!(chord.from, last);
             last = chord.to;

@@ -213,9 +213,8 @@ impl Survey {
             Action::Arc(arc) => {
                 self.layers.segment(0, line, arc.to.e > arc.from.e, arc.to.z);
                 self.was_arc = line == self.known;
-                // The chord is the shortest way.
-                let (x, y) = (arc.to.x - arc.from.x, arc.to.y - arc.from.y);
-                Some((libm::hypot(x, y), arc.feed, arc.from.z, arc.to.z))
+                let [[_, _, low], [_, _, high]] = arc.bounds();
+                Some((arc.length().0, arc.feed, low, high))
             }
             Action::Annotation(Annotation::LayerChange | Annotation::Layer(_)) => {
                 self.layers.announce(line);

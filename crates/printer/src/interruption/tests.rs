@@ -92,7 +92,7 @@ fn z_may_be_anywhere_that_it_can_have_got_to() {
     // Where the user has doubled the speed, it may have got further.
     let faster = Record::Input { at: Place::default(), input: Input::Speed(2.0) };
     let found = surveyed(journal(None, &[faster, at(6)[0].clone(), at(6)[1].clone()])).unwrap();
-    assert_eq!((found.reach_line, found.factors), (13, [2.0, 1.0]));
+    assert_eq!((found.reach_line, found.factors), (11, [2.0, 1.0]));
     // Moved by hand in a pause, and at rest again.
     for (by, range) in [(MovedBy::Others, None), (MovedBy::Nobody, Some([Mm(30.0), Mm(30.0)]))] {
         let mut records = at(12).to_vec();

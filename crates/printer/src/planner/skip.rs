@@ -3,7 +3,7 @@
 //!
 //! Knows nothing of how it gets there, and of what became of the lines that are passed over.
 
-use gcode::{Action, Heater, LineNumber};
+use gcode::{Action, Heater, LineNumber, Position};
 use units::Celsius;
 
 use super::{Planner, Source, source::Next};
@@ -33,14 +33,28 @@ pub(crate) struct Skip {
     /// What heaters and fan are to do at that line.
     pub(crate) targets: Vec<(Heater, Celsius)>,
     pub(crate) fan: f64,
-    /// The highest Z at which anything has been extruded, in mm.
+    /// The highest Z at which anything has been extruded, in mm …
     pub(crate) top: f64,
+    /// … and the lowest and highest X and Y.
+    pub(crate) printed: Option<[[f64; 2]; 2]>,
+    /// Filament that is pulled back at that line, in mm.
+    pub(crate) retracted: f64,
+    filament_max: f64,
 }
 
 impl Skip {
     /// Up to a line; `endstops` is where axes are once they are homed.
     pub(crate) const fn new(until: u32, endstops: [f64; 3]) -> Self {
-        Self { until: LineNumber(until), endstops, targets: Vec::new(), fan: 0.0, top: 0.0 }
+        Self {
+            until: LineNumber(until),
+            endstops,
+            targets: Vec::new(),
+            fan: 0.0,
+            top: 0.0,
+            printed: None,
+            retracted: 0.0,
+            filament_max: 0.0,
+        }
     }
 
     /// The line before which it ends.
@@ -65,15 +79,26 @@ impl Skip {
                     return Err(PrinterError::new(ErrorCode::InvalidGcode, detail));
                 }
                 None => {
-                    let gcode::Position { x, y, z, e } = source.interpreter.position();
+                    let Position { x, y, z, e } = source.interpreter.position();
                     planner.stand_at([x, y, z, 0.0]);
                     (0..3).for_each(|axis| planner.guard.set_homed(axis, true));
                     source.e_offset = planner.position()[EXTRUDER] - e;
+                    self.retracted = (self.filament_max - e).max(0.0);
                     return Ok(Skipped::Done);
                 }
             }
         }
         Ok(Skipped::Working)
+    }
+
+    /// Something has been extruded on the way between these ends, up to so much filament.
+    fn print(&mut self, ends: [[f64; 3]; 2], filament: f64) {
+        self.filament_max = self.filament_max.max(filament);
+        for [x, y, z] in ends {
+            self.top = self.top.max(z);
+            let [[low_x, low_y], [high_x, high_y]] = self.printed.unwrap_or([[x, y]; 2]);
+            self.printed = Some([[low_x.min(x), low_y.min(y)], [high_x.max(x), high_y.max(y)]]);
+        }
     }
 
     fn pass(
@@ -83,8 +108,11 @@ impl Skip {
         source: &mut Source,
     ) -> Result<(), PrinterError> {
         match *action {
-            Action::Move(mv) if mv.to.e > mv.from.e => self.top = self.top.max(mv.to.z),
-            Action::Arc(ref arc) if arc.to.e > arc.from.e => self.top = self.top.max(arc.to.z),
+            Action::Move(mv) if mv.to.e > mv.from.e => {
+                let [from, to] = [mv.from, mv.to].map(|at| [at.x, at.y, at.z]);
+                self.print([from, to], mv.to.e);
+            }
+            Action::Arc(ref arc) if arc.to.e > arc.from.e => self.print(arc.bounds(), arc.to.e),
             Action::SetTemperature { heater, target, .. } => {
                 self.targets.retain(|(known, _)| *known != heater);
                 self.targets.push((heater, target));

@@ -19,6 +19,8 @@ use crate::{
 
 /// The number under which the board counts what is in no journal.
 const NO_JOB: u32 = 0;
+/// What the board says is this old at most, on a link that works.
+const HEARD_LATE: Seconds = Seconds(0.1);
 /// Position and count of an axis agree to so many microsteps: both are rounded.
 const ROUNDING_STEPS: f64 = 1.5;
 
@@ -37,8 +39,12 @@ struct Job {
     /// The number under which the board counts.
     id: u32,
     told: Seconds,
-    /// Progress that has not been written.
-    progress: Option<(u32, Seconds)>,
+    /// The last progress by this host's clock, which the board need not have lived to see …
+    seen: Option<(u32, Seconds)>,
+    /// … that of a moment at which the board was heard of …
+    waiting: Option<((u32, Seconds), Seconds)>,
+    /// … and that after which it was heard of again: it has not been written.
+    made: Option<(u32, Seconds)>,
     /// What was last written of where Z stands.
     height: Option<Height>,
     /// The board counts since its drivers were powered up, as far as is known.
@@ -77,7 +83,9 @@ impl Diary {
             runs: 0,
             id: print,
             told: now,
-            progress: None,
+            seen: None,
+            waiting: None,
+            made: None,
             height: None,
             since_power_up,
         });
@@ -92,7 +100,17 @@ impl Diary {
         }
         let height = taken.height;
         let since_power_up = height.is_some_and(|height| height.since_power_up);
-        self.job = Some(Job { place, runs, id, told: now, progress: None, height, since_power_up });
+        self.job = Some(Job {
+            place,
+            runs,
+            id,
+            told: now,
+            seen: None,
+            waiting: None,
+            made: None,
+            height,
+            since_power_up,
+        });
     }
 
     /// The job is over, at rest: the board holds nothing any more that could be gone on with.
@@ -153,10 +171,21 @@ impl Diary {
         }
     }
 
-    /// The print got to the end of a line's move.
+    /// By this host's clock, the print got to the end of a line's move.
     pub(super) const fn progress(&mut self, line: u32, elapsed: Seconds) {
         if let Some(job) = &mut self.job {
-            job.progress = Some((line, elapsed));
+            job.seen = Some((line, elapsed));
+        }
+    }
+
+    /// The board was heard of: what had been made a little before has been made.
+    pub(super) fn heard(&mut self, now: Seconds) {
+        let Some(job) = &mut self.job else { return };
+        if let Some((made, _)) = job.waiting.take_if(|(_, at)| now - *at >= HEARD_LATE) {
+            job.made = Some(made);
+        }
+        if job.waiting.is_none() {
+            job.waiting = job.seen.take().map(|seen| (seen, now));
         }
     }
 
@@ -170,7 +199,7 @@ impl Diary {
     /// Writes how far the print is: it may be the last that is heard of it.
     pub(super) fn tell_last(&mut self, now: Seconds) {
         let Some(job) = &mut self.job else { return };
-        if let Some((line, elapsed)) = job.progress.take() {
+        if let Some((line, elapsed)) = job.made.take() {
             job.told = now;
             self.writer.write(&Record::Progress { line, elapsed: elapsed.0 });
         }

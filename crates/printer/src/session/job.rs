@@ -99,6 +99,30 @@ pub(super) struct Start {
     /// Ways lead over what has been printed at this height, in mm.
     pub(super) clear_z: f64,
     pub(super) fan: f64,
+    /// The lowest and highest X and Y of what has been printed, in mm.
+    pub(super) printed: Option<[[f64; 2]; 2]>,
+    /// Filament that the lines before have pulled back …
+    pub(super) retracted: f64,
+    /// … and that has been pulled back on the way there, in mm.
+    pub(super) pulled: f64,
+    pub(super) way: Way,
+}
+
+/// How far the way to the first line is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Way {
+    /// The nozzle comes free of what it may stick to.
+    Free,
+    /// Up, above all that has been printed.
+    Up,
+    /// X and Y find out where they are.
+    Home,
+    /// Everything gets as warm as it was.
+    Heat,
+    /// Beside the part, the nozzle is filled.
+    Prime,
+    /// Across, and down.
+    Down,
 }
 
 /// A print.

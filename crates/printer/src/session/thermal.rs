@@ -171,6 +171,11 @@ impl Thermal {
         Ok(any)
     }
 
+    /// Whether the board has lowered any heater because its host fell silent.
+    pub(super) fn has_fallen(&self) -> bool {
+        self.channels.iter().any(Channel::has_fallen)
+    }
+
     /// Whether every heater has reached its target, by what was read since the last long pause.
     pub(super) fn is_heated(&self) -> bool {
         let is_fresh = |channel: &Channel| channel.last_report.is_some_and(|at| at >= self.listening);

@@ -156,6 +156,7 @@ fn motor(
         step_distance: config.step_distance(),
         start: Mm(start),
         frame: frame.map(|(low, high)| (Mm(low), Mm(high))),
+        sag: Mm(0.0),
     }
 }
 

@@ -33,6 +33,7 @@ pub(crate) fn machine() -> Machine {
         mechanics,
         step_distance: Mm(STEP_MM),
         start: Mm(20.0),
+        sag: Mm(0.0),
         frame,
     };
     let frame = Some((Mm(-3.0), Mm(203.0)));

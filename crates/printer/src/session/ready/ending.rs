@@ -105,16 +105,20 @@ impl Ready {
             return Err(PrinterError::new(ErrorCode::BusyPrinting, "what was typed is still being done"));
         }
         let homed = self.planner.guard.homed();
-        if (0..3).any(|axis| was_homed[axis] && !homed[axis]) {
+        // On the way to a first line X and Y are homed above the part.
+        let axes = if start.is_some() { 2..3 } else { 0..3 };
+        if axes.into_iter().any(|axis| was_homed[axis] && !homed[axis]) {
             let detail = match start {
-                Some(_) => "the way to the first line leads from a known place only",
+                Some(_) => "it must be known where Z stands: the way to the first line leads up first",
                 None => "the position was lost while the job was paused",
             };
             return Err(PrinterError::new(ErrorCode::NotHomed, detail));
         }
         let targets = paused.targets.clone();
         let heats = self.heat_again(&targets, could_extrude, false, now)?;
-        if heats {
+        if start.is_some() {
+            self.set_out(heats);
+        } else if heats {
             self.wait = Wait::Heat;
         } else {
             self.go_back()?;
@@ -130,12 +134,11 @@ impl Ready {
     /// does an axis whose position was not known then.
     pub(super) fn go_back(&mut self) -> Result<(), PrinterError> {
         let Some(paused) = self.job.as_ref().and_then(|job| job.paused.as_ref()) else { return Ok(()) };
-        let Paused { position, homed: was_homed, start, .. } = *paused;
+        let Paused { position, homed: was_homed, .. } = *paused;
         let here = self.planner.position();
         let [x, y, z] =
             core::array::from_fn(|axis| if was_homed[axis] { position[axis] } else { here[axis] });
-        let clear_z = start.map_or(z, |start| start.clear_z);
-        let (up, e) = (here[2].max(z).max(clear_z), here[3]);
+        let (up, e) = (here[2].max(z), here[3]);
         for to in [[here[0], here[1], up, e], [x, y, up, e], [x, y, z, e]] {
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
         }
@@ -190,6 +193,12 @@ impl Ready {
 
     /// The machine is where the job was paused: its own planner goes on.
     fn has_returned(&mut self, now: Seconds) {
+        match self.next_stretch() {
+            Ok(true) => return,
+            Ok(false) => {}
+            Err(error) => return self.source_failed(error, now),
+        }
+        self.note_height(self.planner.position()[2], MovedBy::File);
         let Some(job) = &mut self.job else { return };
         job.state = JobState::Printing;
         if let Some(paused) = job.paused.take() {

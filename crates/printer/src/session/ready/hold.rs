@@ -263,7 +263,7 @@ impl Ready {
                 self.events.push(Event::Held(hold_error(hold.reason, self.calls.gap.take())));
             }
             Some(_) => {}
-            None if matches!(self.wait, Wait::Heat) => {
+            None if matches!(self.wait, Wait::Free | Wait::Heat) => {
                 self.wait = Wait::Nothing;
                 if let Some(job) = &mut self.job {
                     job.state = JobState::Paused;

@@ -160,7 +160,11 @@ impl Ready {
         self.note_call(now);
         // After a long pause nothing may be claimed of the motion clock, whose 32 bits say little then.
         self.lease.is_in_doubt(&mut self.board, now);
-        for (message, sent) in inbox::receive(&mut self.board.link, &self.board.dictionary, bytes, now) {
+        let messages = inbox::receive(&mut self.board.link, &self.board.dictionary, bytes, now);
+        if !messages.is_empty() {
+            self.diary.heard(now);
+        }
+        for (message, sent) in messages {
             if let Some(sent) = sent {
                 self.board.said_after = self.board.said_after.max(sent);
             }
@@ -350,14 +354,6 @@ impl Ready {
                 let [x, y, z, e] = self.planner.position();
                 self.events.push(Event::Message(format!("X:{x:.3} Y:{y:.3} Z:{z:.3} E:{e:.3}")));
             }
-        }
-    }
-
-    /// The source whose G-code is being carried out.
-    fn source_mut(&mut self) -> &mut Source {
-        match &mut self.job {
-            Some(job) if job.is_active() => &mut job.source,
-            _ => &mut self.console.source,
         }
     }
 }

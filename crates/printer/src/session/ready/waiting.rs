@@ -10,7 +10,7 @@ use crate::{
     error::{ErrorCode, PrinterError},
     journal::MovedBy,
     machine,
-    planner::Barrier,
+    planner::{Barrier, ExtrusionPermit},
     session::{
         event::Event,
         homing::{AxisHoming, Wish},
@@ -21,6 +21,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) enum Wait {
     Nothing,
+    /// Until a nozzle that may stick to the part comes free.
+    Free,
     /// For all heaters, before a paused job goes back to where it was.
     Heat,
     Heater {
@@ -65,7 +67,7 @@ impl Wait {
         let held = match *self {
             Self::Heater { heater, until } => HeldWait::Heater { heater, until },
             Self::Dwell { until } => HeldWait::Dwell { rest: until - now },
-            Self::Nothing | Self::Heat | Self::Homing { .. } => return HeldWait::Nothing,
+            Self::Nothing | Self::Free | Self::Heat | Self::Homing { .. } => return HeldWait::Nothing,
         };
         *self = Self::Nothing;
         held
@@ -96,10 +98,20 @@ impl Ready {
     pub(super) fn advance_wait(&mut self, now: Seconds) {
         match &mut self.wait {
             Wait::Nothing => {}
+            Wait::Free => {
+                if self.thermal.is_heated() || self.extrusion_permit() == ExtrusionPermit::Allowed {
+                    self.wait = Wait::Nothing;
+                }
+            }
             Wait::Heat => {
                 if self.thermal.is_heated() {
                     self.wait = Wait::Nothing;
-                    if let Err(error) = self.go_back() {
+                    let is_start = self
+                        .job
+                        .as_ref()
+                        .and_then(|job| job.paused.as_ref())
+                        .is_some_and(|it| it.start.is_some());
+                    if !is_start && let Err(error) = self.go_back() {
                         self.source_failed(error, now);
                     }
                 }
@@ -188,7 +200,20 @@ impl Ready {
         }
         let position = self.planner.position();
         let [x, y, z] = core::array::from_fn(|axis| axes[axis].then_some(position[axis]));
-        self.source_mut().interpreter.set_axes(x, y, z);
+        // A job that is paused, or on its way to its first line, has nothing to do with it.
+        let plans_job = self.plans_job();
+        let source = self.job.as_mut().filter(|_| plans_job).map(|job| &mut job.source);
+        source.unwrap_or(&mut self.console.source).interpreter.set_axes(x, y, z);
+    }
+
+    /// Has axes homed, one after the other.
+    pub(super) fn begin_homing(&mut self, axes: [bool; 3], line: LineNumber) {
+        let mut remaining: VecDeque<usize> = (0..3).filter(|&axis| axes[axis]).collect();
+        if let Some(axis) = remaining.pop_front()
+            && let Some(homing) = AxisHoming::new(axis, &self.config.steppers[axis], &self.board)
+        {
+            self.wait = Wait::Homing { axis: Box::new(homing), remaining, axes, line };
+        }
     }
 
     pub(super) fn homing_failed(&mut self, mut error: PrinterError, now: Seconds) {
@@ -211,14 +236,7 @@ impl Ready {
         now: Seconds,
     ) -> Result<bool, Failure> {
         match *barrier {
-            Barrier::Home(axes) => {
-                let mut remaining: VecDeque<usize> = (0..3).filter(|&axis| axes[axis]).collect();
-                if let Some(axis) = remaining.pop_front()
-                    && let Some(homing) = AxisHoming::new(axis, &self.config.steppers[axis], &self.board)
-                {
-                    self.wait = Wait::Homing { axis: Box::new(homing), remaining, axes, line };
-                }
-            }
+            Barrier::Home(axes) => self.begin_homing(axes, line),
             Barrier::WaitTemperature { heater, target, wait } => {
                 match self.thermal.set_target(heater, target, &mut self.board, now) {
                     Ok(()) => {
