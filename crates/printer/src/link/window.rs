@@ -376,8 +376,8 @@ impl Window {
         let place = self.unanswered;
         self.unanswered = (place + 1).min(self.transmissions);
         let age_s = now_s - front.last_s;
-        let answers_front =
-            place >= self.latest(self.expected).place && age_s >= self.round_trip.answer_s_min();
+        let answers_front = place >= self.latest(self.expected).place
+            && age_s >= self.round_trip.repeated_answer_s_min(front.transmissions);
         if answers_front {
             self.send_again = true;
         } else {
