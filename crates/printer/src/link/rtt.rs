@@ -83,16 +83,10 @@ impl RoundTrip {
         ALLOWANCE * self.floor
     }
 
-    /// An answer that comes sooner than this after what has been sent so many times belongs to one of the times before, in
-    /// seconds.
-    ///
-    /// On a line that holds bytes up, what was sent again in vain is answered late, and each such answer looks as if what
-    /// was sent last had been lost: taken so, it fills the line with repetitions, and answers come later still.
-    pub(super) fn repeated_answer_s_min(&self, transmissions: u32) -> f64 {
-        const STEP: f64 = 0.2;
-        const STEPS_MAX: u32 = 4;
-        let steps = transmissions.saturating_sub(1).min(STEPS_MAX);
-        self.answer_s_min().max(STEP * f64::from(steps) * self.smoothed.unwrap_or(0.0))
+    /// Hardly an answer comes sooner than this after what caused it, in seconds.
+    pub(super) fn usual_answer_s_min(&self) -> f64 {
+        const ALLOWANCE: f64 = 0.8;
+        ALLOWANCE * self.smoothed.unwrap_or(0.0)
     }
 
     /// No answer comes later than this after what caused it, in seconds.
