@@ -187,6 +187,7 @@ impl UiEvent {
             | Event::Move(_)
             | Event::RunEnded { .. }
             | Event::RunBroken { .. }
+            | Event::RunResumed { .. }
             | Event::Annotation(_)
             | Event::Object(_) => return None,
         })

@@ -38,6 +38,10 @@ pub struct MachineConfig {
     /// How long a board that regulates its heaters keeps them at stand-by when the host falls silent (an option of our
     /// own); then they go off.
     pub standby_time: Seconds,
+    /// By how much the head is lifted in a pause (an option of our own) …
+    pub pause_lift: Mm,
+    /// … and where it goes then, X and Y (two options of our own); where not given, it stays above the part.
+    pub pause_position: [Option<Mm>; 2],
     /// Top speed of Z; `max_velocity` where not given.
     pub max_z_velocity: MmPerS,
     /// Acceleration of Z; `max_accel` where not given.
@@ -72,6 +76,9 @@ const ACCEL_MAX: f64 = 1_000_000.0;
 const STANDBY_TIME_S: f64 = 1_800.0;
 /// The most that a board takes.
 const STANDBY_TIME_MAX_S: f64 = 14_400.0;
+/// Clear of the part, and back in a second.
+const PAUSE_LIFT_MM: f64 = 5.0;
+const PAUSE_LIFT_MAX_MM: f64 = 100.0;
 /// At 1 the head could not speed up at all.
 const MINIMUM_CRUISE_RATIO_MAX: f64 = 0.999_999;
 /// A week: longer means "never", which a heater must not have.
@@ -120,6 +127,9 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
     }
     let standby_time =
         reader.number_or("standby_time", STANDBY_TIME_S, Range::from(0.0).to(STANDBY_TIME_MAX_S));
+    let pause_lift = reader.number_or("pause_lift", PAUSE_LIFT_MM, Range::from(0.0).to(PAUSE_LIFT_MAX_MM));
+    let pause_x = reader.optional_number("pause_x", Range::from(-10_000.0));
+    let pause_y = reader.optional_number("pause_y", Range::from(-10_000.0));
     let max_z_velocity = reader.optional_number("max_z_velocity", Range::above(0.0).to(VELOCITY_MAX));
     let max_z_accel = reader.optional_number("max_z_accel", Range::above(0.0).to(ACCEL_MAX));
     reader.finish();
@@ -132,6 +142,8 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
         square_corner_velocity: MmPerS(corner?),
         minimum_cruise_ratio: cruise?,
         standby_time: Seconds(standby_time?),
+        pause_lift: Mm(pause_lift?),
+        pause_position: [pause_x?.map(Mm), pause_y?.map(Mm)],
         // As in Klipper, the whole machine's limits hold for Z too.
         max_z_velocity: MmPerS(max_z_velocity?.unwrap_or(max_velocity).min(max_velocity)),
         max_z_accel: MmPerS2(max_z_accel?.unwrap_or(max_accel).min(max_accel)),

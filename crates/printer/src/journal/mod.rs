@@ -71,6 +71,32 @@ pub struct RowPlace {
     pub left: u16,
 }
 
+impl RowPlace {
+    /// The place of a motor whose rows the board counts from here.
+    pub(crate) const fn after(self, queue: &MotorQueue) -> Self {
+        // The first row that is counted may be the rest of one: then that has not been made whole before.
+        let left = if queue.done == 0 && queue.left == 0 { self.left } else { queue.left };
+        Self { done: self.done.saturating_add(queue.done), left }
+    }
+}
+
+/// Where a motor stood in its rows when the board dropped them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Dropped {
+    /// Rows that it had received …
+    pub received: u32,
+    /// … and made.
+    pub done: u32,
+    /// Steps of the next that it had not made.
+    pub left: u16,
+    /// The level of its direction pin for them.
+    pub dir: bool,
+    /// Steps counted since power-up.
+    pub position: i32,
+    /// The check over its rows.
+    pub crc: u32,
+}
+
 /// A heater in a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -89,6 +115,23 @@ impl HeaterName {
             Self::Bed => gcode::Heater::Bed,
         }
     }
+}
+
+/// A print that was put aside in the middle of a run of motion, or just behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Parked {
+    /// The board's number while the head is anywhere else.
+    pub id: u32,
+    /// The number under which it counted before.
+    pub of: u32,
+    /// Motion had been brought to rest; else the run had come to its end.
+    pub is_cut: bool,
+    /// Where each motor stood.
+    pub motors: [Dropped; MOTORS],
+    /// The low half of the motion clock then.
+    pub rest: u32,
+    /// The filament that is pulled back, in mm.
+    pub retract: f64,
 }
 
 /// A line of a journal.
@@ -134,6 +177,8 @@ pub enum Record {
         /// Where each motor's count begins.
         from: [RowPlace; MOTORS],
     },
+    /// The print was put aside, and the head leaves the part: meanwhile the board counts under this number.
+    Parked(Parked),
     /// A host that began anew took up the plan: of the inputs so far only so many had come into force.
     Continued {
         /// See the record.
@@ -242,6 +287,9 @@ pub struct Journal {
     pub start_line: Option<u32>,
     inputs: Vec<(Place, Input)>,
     runs: Vec<CountedRun>,
+    parked: Vec<Parked>,
+    /// The last of the board's numbers.
+    last_id: u32,
     /// The line of the last move that was seen to be made, and the print time then.
     pub progress: Option<(u32, Seconds)>,
     /// What was last known of where the Z axis stands.
@@ -310,6 +358,8 @@ impl Journal {
             start_line,
             inputs: Vec::new(),
             runs: Vec::new(),
+            parked: Vec::new(),
+            last_id: print,
             progress: None,
             height: None,
             has_ended: false,
@@ -321,7 +371,14 @@ impl Journal {
         match *record {
             Record::Input { at, input } => self.inputs.push((at, input)),
             Record::Continued { inputs } => self.inputs.truncate(inputs),
-            Record::Run { id, run, start, from } => self.runs.push(CountedRun { id, run, start, from }),
+            Record::Run { id, run, start, from } => {
+                self.last_id = id;
+                self.runs.push(CountedRun { id, run, start, from });
+            }
+            Record::Parked(parked) => {
+                self.last_id = parked.id;
+                self.parked.push(parked);
+            }
             Record::Progress { line, elapsed } => self.progress = Some((line, Seconds(elapsed))),
             Record::Height(height) => self.height = Some(height),
             // A second begin belongs to another print, which has no place in this journal.
@@ -354,7 +411,19 @@ impl Journal {
 
     /// Whether a board that counts under this number carries out this print.
     pub fn knows(&self, id: u32) -> bool {
-        self.runs.iter().any(|run| run.id == id)
+        self.runs.iter().any(|run| run.id == id) || self.parked.iter().any(|parked| parked.id == id)
+    }
+
+    /// What a board would say of the print had it not been put aside, and how it was, if it was.
+    fn unparked(&self, queue: BoardQueue) -> (BoardQueue, Option<Parked>) {
+        let Some(&parked) = self.parked.iter().rfind(|parked| parked.id == queue.id) else {
+            return (queue, None);
+        };
+        let motors = parked.motors.map(|motor| {
+            let Dropped { received, done, left, dir, position, crc } = motor;
+            MotorQueue { received, done, left, dir, position, crc, ..MotorQueue::default() }
+        });
+        (BoardQueue { id: parked.of, is_held: parked.is_cut, motors }, Some(parked))
     }
 }
 
@@ -369,108 +438,4 @@ fn next_record(bytes: &[u8]) -> Option<(Record, &[u8])> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn began() -> Record {
-        Record::Began {
-            format: FORMAT,
-            print: 7,
-            machine: 1,
-            clock: 12_000_000,
-            position: [0.1 + 0.2, 1.0 / 3.0, f64::MIN_POSITIVE, 4.0],
-            homed: [true, false, true],
-            confirmed: [3, 9].into(),
-            confirm_all: false,
-            start_line: None,
-        }
-    }
-
-    fn written(records: &[Record]) -> String {
-        let mut writer = Writer::default();
-        for record in records {
-            writer.write(record);
-        }
-        writer.take()
-    }
-
-    #[test]
-    fn what_was_written_is_read_to_the_last_bit() {
-        let at = Place { items: 12, drained: Some(345) };
-        let from = [RowPlace { done: 1, left: 2 }; MOTORS];
-        let records = [
-            began(),
-            Record::Input { at, input: Input::Speed(0.1 + 0.7) },
-            Record::Input { at, input: Input::FinishRun },
-            Record::Run { id: 8, run: 1, start: u32::MAX, from },
-            Record::Continued { inputs: 1 },
-            Record::Input { at, input: Input::Target(HeaterName::Bed, 60.5) },
-            Record::Progress { line: 77, elapsed: 1.5 },
-        ];
-        let text = written(&records);
-        let journal = Journal::read(text.as_bytes()).unwrap();
-        assert_eq!(
-            journal.position.map(f64::to_bits),
-            [0.1 + 0.2, 1.0 / 3.0, f64::MIN_POSITIVE, 4.0].map(f64::to_bits)
-        );
-        assert_eq!(
-            journal.inputs,
-            [(at, Input::Speed(0.1 + 0.7)), (at, Input::Target(HeaterName::Bed, 60.5))]
-        );
-        assert!(journal.knows(8) && !journal.knows(7) && !journal.has_ended);
-        assert_eq!((journal.progress, journal.bytes), (Some((77, Seconds(1.5))), text.len()));
-        assert!(Journal::read((text + &written(&[Record::Ended])).as_bytes()).unwrap().has_ended);
-    }
-
-    #[test]
-    fn what_is_none_of_ours_is_refused() {
-        let mut other = began();
-        if let Record::Began { format, .. } = &mut other {
-            *format = FORMAT + 1;
-        }
-        let other = written(&[other]);
-        assert_eq!(Journal::read(other.as_bytes()), Err(JournalError::Format(FORMAT + 1)));
-        for bytes in [&b""[..], b"\n", b"00000000 {}\n", written(&[Record::Ended]).as_bytes()] {
-            assert_eq!(Journal::read(bytes), Err(JournalError::NoBegin));
-        }
-        // Two prints in one journal are none.
-        assert!(Journal::read(written(&[began(), began()]).as_bytes()).unwrap().has_ended);
-    }
-
-    #[test]
-    fn a_writer_that_nobody_reads_stops_and_says_no_more() {
-        let mut writer = Writer::default();
-        (0..100_000).for_each(|line| writer.write(&Record::Progress { line, elapsed: 0.0 }));
-        assert!(writer.take().len() <= PENDING_BYTES_MAX);
-        writer.write(&Record::Ended);
-        assert_eq!(writer.take(), "");
-    }
-
-    proptest! {
-        #[test]
-        fn damage_never_adds_anything(flips in prop::collection::vec((0..600_usize, 1..=255_u8), 1..4)) {
-            let records = [
-                began(),
-                Record::Run { id: 8, run: 1, start: 5, from: [RowPlace::default(); MOTORS] },
-                Record::Progress { line: 1, elapsed: 1.0 },
-                Record::Ended,
-            ];
-            let mut bytes = written(&records).into_bytes();
-            for (at, mask) in flips {
-                let len = bytes.len();
-                bytes[at % len] ^= mask;
-            }
-            // It is what was written up to the damage.
-            if let Ok(journal) = Journal::read(&bytes) {
-                let whole = |count: usize| Journal::read(written(&records[..count]).as_bytes()).unwrap();
-                prop_assert!((1..=4).any(|count| whole(count) == journal));
-            }
-        }
-
-        #[test]
-        fn anything_can_be_read(bytes: Vec<u8>) {
-            drop(Journal::read(&bytes));
-        }
-    }
-}
+mod tests;

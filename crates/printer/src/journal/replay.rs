@@ -15,7 +15,7 @@ use units::{Celsius, Clock32, Seconds, Ticks};
 use wire::RowCheck;
 
 use super::{
-    CountedRun, Height, Input, Journal, Place, RowPlace, machine_check,
+    CountedRun, Height, Input, Journal, Parked, Place, RowPlace, machine_check,
     rows::{BoardQueue, Row},
 };
 use crate::{
@@ -85,6 +85,8 @@ pub(crate) struct Continuation {
     pub(crate) elapsed: Seconds,
     /// The number under which the board last counted.
     pub(crate) id: u32,
+    /// How it was put aside, where it was.
+    pub(crate) parked: Option<Parked>,
     /// What was last written of where Z stands.
     pub(crate) height: Option<Height>,
 }
@@ -123,6 +125,7 @@ pub(crate) struct Replay {
     elapsed: Seconds,
     /// The last number in the journal.
     last_id: u32,
+    parked: Option<Parked>,
     height: Option<Height>,
     /// Reads up to the line with which the print begins.
     skip: Option<Skip>,
@@ -147,6 +150,7 @@ impl Replay {
         if journal.machine != machine_check(config) || journal.clock != clock {
             return Err(differs("the machine file or the board is not the one it was begun with"));
         }
+        let (queue, parked) = journal.unparked(queue);
         let wanted = journal.runs.iter().rfind(|run| run.id == queue.id);
         let wanted = *wanted.ok_or_else(|| differs("the board carries out something else"))?;
         let mut planner = Planner::new(config, clock)?;
@@ -180,7 +184,8 @@ impl Replay {
             targets: Vec::new(),
             fan: 0.0,
             elapsed: Seconds::ZERO,
-            last_id: journal.runs.last().map_or(0, |run| run.id),
+            last_id: journal.last_id,
+            parked,
             height: journal.height,
             skip: journal.start_line.map(|line| Skip::new(line, endstops)),
             is_done: false,
@@ -259,13 +264,7 @@ impl Replay {
         for &input in &adopted {
             apply_factor(&mut source, input);
         }
-        let from = core::array::from_fn(|motor| {
-            let (base, queue) = (self.wanted.from[motor], self.queue.motors[motor]);
-            let done = base.done.saturating_add(queue.done);
-            // The first row that is counted may be the rest of one: then that has not been made whole before.
-            let left = if queue.done == 0 && queue.left == 0 { base.left } else { queue.left };
-            RowPlace { done, left }
-        });
+        let from = core::array::from_fn(|motor| self.wanted.from[motor].after(&self.queue.motors[motor]));
         let forward = self.motors.each_ref().map(|motor| motor.forward);
         let made = self.motors.each_ref().map(|motor| motor.made);
         Continuation {
@@ -288,6 +287,7 @@ impl Replay {
             fan: self.fan,
             elapsed: self.elapsed,
             id: self.last_id,
+            parked: self.parked,
             height: self.height,
         }
     }

@@ -46,7 +46,7 @@ pub(crate) struct Row {
 
 impl Row {
     /// The last `left` steps of it.
-    pub(super) fn tail(self, left: u16) -> Self {
+    pub(crate) fn tail(self, left: u16) -> Self {
         let made = i64::from(self.count - left);
         if made == 0 {
             return self;

@@ -10,8 +10,8 @@ use super::{board::Board, job::JobOptions};
 use crate::{
     config::PrinterConfig,
     journal::{
-        Continuation, FORMAT, HeaterName, Height, Input, MovedBy, PROGRESS_INTERVAL, Place, Record, RowPlace,
-        Writer, machine_check,
+        Continuation, Dropped, FORMAT, HeaterName, Height, Input, MotorQueue, MovedBy, PROGRESS_INTERVAL,
+        Parked, Place, Record, RowPlace, Writer, machine_check,
     },
     machine::MOTORS,
     planner::{Planned, Planner},
@@ -49,6 +49,16 @@ struct Job {
     height: Option<Height>,
     /// The board counts since its drivers were powered up, as far as is known.
     since_power_up: bool,
+    /// It is put aside, and can be taken up from there.
+    is_parked: bool,
+}
+
+impl Job {
+    /// Another number for the board.
+    fn next_id(&mut self) -> u32 {
+        self.id = self.id.wrapping_add(1).max(NO_JOB + 1);
+        self.id
+    }
 }
 
 impl Diary {
@@ -88,6 +98,7 @@ impl Diary {
             made: None,
             height: None,
             since_power_up,
+            is_parked: false,
         });
     }
 
@@ -100,6 +111,7 @@ impl Diary {
         }
         let height = taken.height;
         let since_power_up = height.is_some_and(|height| height.since_power_up);
+        let is_parked = taken.parked.is_some();
         self.job = Some(Job {
             place,
             runs,
@@ -110,12 +122,13 @@ impl Diary {
             made: None,
             height,
             since_power_up,
+            is_parked,
         });
     }
 
     /// The job is over, at rest: the board holds nothing any more that could be gone on with.
     pub(super) fn end(&mut self, board: &mut Board) {
-        self.other_run(board);
+        self.lose_place(board);
         if self.job.take().is_some() {
             self.writer.write(&Record::Ended);
         }
@@ -148,7 +161,7 @@ impl Diary {
         self.input(Input::Target(name, celsius));
     }
 
-    /// A run of the job's motion begins at a motion clock: the board counts its rows.
+    /// A run of the job's motion begins at a motion clock: the board counts its rows, whether or not they are journaled.
     pub(super) fn run(&mut self, start: Ticks, board: &mut Board) {
         if let Some(job) = &mut self.job {
             job.runs += 1;
@@ -158,15 +171,49 @@ impl Diary {
 
     /// The board counts the rows of the present run anew, from there.
     pub(super) fn count(&mut self, start: Ticks, from: [RowPlace; MOTORS], board: &mut Board) {
-        let Some(job) = self.job.as_mut().filter(|_| board.layout.has_motion_clock) else { return };
-        job.id = job.id.wrapping_add(1).max(NO_JOB + 1);
-        board.control(&Command::MotionJob { id: job.id });
-        self.writer.write(&Record::Run { id: job.id, run: job.runs, start: start.low().0, from });
+        if !board.layout.has_motion_clock {
+            return;
+        }
+        let Some(job) = &mut self.job else { return board.control(&Command::MotionJob { id: NO_JOB }) };
+        job.is_parked = false;
+        let id = job.next_id();
+        board.control(&Command::MotionJob { id });
+        self.writer.write(&Record::Run { id, run: job.runs, start: start.low().0, from });
     }
 
-    /// A run begins that is none of the job's: while it is made, the job cannot be taken up.
-    pub(super) fn other_run(&self, board: &mut Board) {
-        if self.job.is_some() && board.layout.has_motion_clock {
+    /// The job is put aside where its motors stand so; then the head is moved. It can be taken up as long as only the
+    /// planner moves it.
+    pub(super) fn park(
+        &mut self,
+        queues: &[MotorQueue; MOTORS],
+        is_cut: bool,
+        rest: Ticks,
+        retract: f64,
+        board: &mut Board,
+    ) {
+        let Some(job) = &mut self.job else { return };
+        job.is_parked = true;
+        let of = job.id;
+        let id = job.next_id();
+        board.control(&Command::MotionJob { id });
+        let motors = queues.map(|queue| {
+            let MotorQueue { received, done, left, dir, position, crc, .. } = queue;
+            Dropped { received, done, left, dir, position, crc }
+        });
+        self.writer.write(&Record::Parked(Parked { id, of, is_cut, motors, rest: rest.low().0, retract }));
+    }
+
+    /// A run begins that is none of the job's. Unless the job was put aside, it cannot be taken up any more.
+    pub(super) fn other_run(&mut self, board: &mut Board) {
+        if !self.job.as_ref().is_some_and(|job| job.is_parked) {
+            self.lose_place(board);
+        }
+    }
+
+    /// Where the machine stands is told by other things than its motors' counts: the job cannot be taken up.
+    pub(super) fn lose_place(&mut self, board: &mut Board) {
+        if let Some(job) = self.job.as_mut().filter(|_| board.layout.has_motion_clock) {
+            job.is_parked = false;
             board.control(&Command::MotionJob { id: NO_JOB });
         }
     }

@@ -102,6 +102,14 @@ pub enum Event {
         /// The board's motion clock.
         at: Ticks,
     },
+    /// A run of motion that was broken off in a pause goes on from there: all that was still to be made of it is made
+    /// at motion clocks that are so much later. Its moves are told again.
+    RunResumed {
+        /// The board's motion clock when it was broken off …
+        broken: Ticks,
+        /// … and when it goes on.
+        at: Ticks,
+    },
     /// An axis found its endstop: it is at this position now.
     Homed {
         /// 0, 1, 2 for X, Y, Z.
@@ -190,6 +198,16 @@ pub struct SpeedProfile {
     pub cruise_from: Ticks,
     /// When it begins to slow down.
     pub cruise_until: Ticks,
+}
+
+impl ScheduledMove {
+    /// The same move at other times.
+    pub(super) fn at(self, time: impl Fn(Ticks) -> Ticks) -> Self {
+        let SpeedProfile { cruise_from, cruise_until, .. } = self.speed;
+        let speed =
+            SpeedProfile { cruise_from: time(cruise_from), cruise_until: time(cruise_until), ..self.speed };
+        Self { start: time(self.start), end: time(self.end), speed, ..self }
+    }
 }
 
 impl SpeedProfile {

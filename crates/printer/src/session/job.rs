@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use gcode::Settings;
 use units::{MmPerS, Seconds};
 
+use super::stream::Cut;
 use crate::{
     error::PrinterError,
     planner::{Planner, Position, Skip, Source},
@@ -47,6 +48,10 @@ pub(super) enum JobState {
     Printing,
     /// Coming to rest; then it waits.
     Pausing,
+    /// Coming to rest on the path, where the board can hold it; then it is put aside …
+    Halting,
+    /// … and the head is parked.
+    Parking,
     /// Reading up to the line with which it begins; then it is paused.
     Skipping,
     Paused,
@@ -89,6 +94,17 @@ pub(super) struct Paused {
     pub(super) targets: Vec<(gcode::Heater, units::Celsius)>,
     /// Where it begins in the middle of its file.
     pub(super) start: Option<Start>,
+    /// The rest of the run of motion that it was in, where it was paused on its path …
+    pub(super) cut: Option<Box<Cut>>,
+    /// … and what was pulled back of the filament.
+    pub(super) retracted: Option<Retracted>,
+}
+
+/// Where the filament was pulled back from and to, in mm.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Retracted {
+    pub(super) from: f64,
+    pub(super) to: f64,
 }
 
 /// How a job begins that does not begin with its file.
@@ -158,7 +174,7 @@ impl Job {
     pub(super) const fn status(&self) -> JobStatus {
         match self.state {
             JobState::Printing | JobState::Skipping | JobState::Returning => JobStatus::Printing,
-            JobState::Pausing => JobStatus::Pausing,
+            JobState::Pausing | JobState::Halting | JobState::Parking => JobStatus::Pausing,
             JobState::Paused => JobStatus::Paused,
             JobState::Cancelling | JobState::Failing(_) => JobStatus::Ending,
         }

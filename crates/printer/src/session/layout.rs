@@ -49,9 +49,11 @@ const NEEDED: &[CommandKind] = &[
 const MOTION_NEEDED: &[CommandKind] = &[
     CommandKind::MotionLease,
     CommandKind::MotionEnd,
+    CommandKind::MotionHold,
     CommandKind::MotionResume,
     CommandKind::MotionGetState,
     CommandKind::MotionDrop,
+    CommandKind::MotionJob,
     CommandKind::MotionTie,
     CommandKind::StepperGetQueue,
 ];

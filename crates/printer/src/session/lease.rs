@@ -6,8 +6,7 @@
 //! moment at which a host may die and leave motors to run out of steps at full speed. Of a run that is shorter than what
 //! coming to rest takes, the board has all or nothing. Homing has no lease: its triggers have a time-out of their own.
 //!
-//! Knows no G-code and no jobs. A pause that holds instead of running the queue empty would attach here: `motion_hold`
-//! and the lease's end, then the same way back as after a stall.
+//! Knows no G-code and no jobs.
 
 use units::{Seconds, Ticks};
 use wire::Command;
@@ -23,8 +22,8 @@ const RENEW: Seconds = Seconds(0.15);
 const RAMP_MIN: Seconds = Seconds(0.3);
 /// … which adds at most this part of a motor's acceleration to the plan's own.
 const ADDED_PART: f64 = 1.0 / 3.0;
-/// The ramp where nothing moves yet, or what moves is all there.
-const RAMP_AT_START: Seconds = Seconds(0.015);
+/// The ramp where nothing moves, or what moves is all there.
+pub(super) const RAMP_AT_REST: Seconds = Seconds(0.015);
 /// The lease covers more once there is this much more motion than what coming to rest takes: renewals take their time.
 const COVER_SPARE: Seconds = Seconds(0.5);
 /// The board says four times a second how its motion goes while there is a lease. Without a word for this long, it may
@@ -124,7 +123,7 @@ impl Lease {
             if cover.until >= motion_now + needed {
                 self.tell(cover, board, now);
             } else if cover.is_end {
-                self.lease(cover, RAMP_AT_START, board, now);
+                self.lease(cover, RAMP_AT_REST, board, now);
             } else if now - told.at >= RENEW {
                 self.begin(run, board, now);
             }
@@ -140,7 +139,7 @@ impl Lease {
 
     /// A lease on the time before the run.
     fn begin(&mut self, run: Run, board: &mut Board, now: Seconds) {
-        self.lease(Cover { until: run.start, is_end: false }, RAMP_AT_START, board, now);
+        self.lease(Cover { until: run.start, is_end: false }, RAMP_AT_REST, board, now);
         self.told.iter_mut().for_each(|told| told.at_start = true);
     }
 

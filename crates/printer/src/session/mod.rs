@@ -18,6 +18,7 @@ mod fan;
 mod homing;
 mod inbox;
 mod job;
+mod kept;
 mod layout;
 mod lease;
 mod motion_time;

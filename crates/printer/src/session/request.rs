@@ -42,6 +42,7 @@ impl Session {
             }
             Request::SetFan(speed) => {
                 ready.thermal.set_fan(speed, None, &mut ready.board, now);
+                ready.stream.kept.set_fan(speed);
                 ready.diary.input(Input::Fan(speed));
             }
             Request::SetSpeedFactor(factor) => {
@@ -248,7 +249,7 @@ impl Ready {
             let detail = format!("an axis cannot stand at {position}");
             return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail));
         }
-        self.diary.other_run(&mut self.board);
+        self.diary.lose_place(&mut self.board);
         self.planner.set_axis(axis, position.0, true);
         self.note_height(self.planner.position()[2], MovedBy::Others);
         self.planner.correct(&mut self.console.source);

@@ -11,9 +11,14 @@ use steps::{StepCommand, StepCommandKind};
 use units::{Seconds, Ticks};
 use wire::Command;
 
-use super::{board::Board, event::ScheduledMove};
+use super::{
+    board::{Board, FAN_LANE},
+    event::ScheduledMove,
+    kept::{KEPT_AFTER, Kept, Left},
+};
 use crate::{
-    journal::Row,
+    error::PrinterError,
+    journal::{MotorQueue, Row, RowPlace},
     link::Lane,
     machine::MOTORS,
     planner::{Position, TimedAction},
@@ -65,6 +70,23 @@ pub(super) struct TakenUp {
     pub(super) elapsed: Seconds,
 }
 
+/// A run of motion that was put aside at rest on its path.
+#[derive(Debug)]
+pub(super) struct Cut {
+    pub(super) run: Run,
+    /// The motion clock of that rest.
+    pub(super) at: Ticks,
+    pub(super) left: Left,
+    /// Each motor's direction after the rows that are left.
+    pub(super) forward: [bool; MOTORS],
+    /// Steps that the board has counted in the run.
+    pub(super) made: [i32; MOTORS],
+    pub(super) position_at_start: Position,
+    /// Print time of the runs before.
+    pub(super) elapsed: Seconds,
+    pub(super) timeline: VecDeque<(Ticks, Due)>,
+}
+
 /// What has to be said to a motor before its next steps.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pending {
@@ -92,6 +114,11 @@ pub(super) struct MotionStream {
     position_at_start: Position,
     /// Print time of the runs that have ended.
     elapsed: Seconds,
+    /// What the board may not have made yet.
+    pub(super) kept: Kept,
+    /// Rows that the board has dropped, before those that are pushed next, and each motor's direction after them.
+    again: [VecDeque<Row>; MOTORS],
+    again_forward: [bool; MOTORS],
 }
 
 impl MotionStream {
@@ -118,6 +145,8 @@ impl MotionStream {
     pub(super) fn wants_more(&self, generated_until: Option<Ticks>, clock_now: Ticks, board: &Board) -> bool {
         let has_room = |motor| board.link.room(Lane::Motion(motor as u8)) >= LANE_ROOM_MIN;
         self.timeline.len() < TIMELINE_MAX
+            && !self.kept.is_full()
+            && self.again.iter().all(VecDeque::is_empty)
             && (0..MOTORS).all(has_room)
             && self
                 .run
@@ -133,15 +162,20 @@ impl MotionStream {
     /// A run starts as soon as the link allows.
     pub(super) fn start_run(&mut self, position: Position, board: &Board, now: Seconds, homing: bool) -> Run {
         // A driver that has just been switched off is first on again.
-        let switched = self.switched.iter().fold(Ticks(0), |last, &clock| last.max(clock));
-        let ready = switched.saturating_sub(board.clock_at(now)) + board.ticks(ENABLE_LEAD * 2.0);
+        let ready = self.switched().saturating_sub(board.clock_at(now)) + board.ticks(ENABLE_LEAD * 2.0);
         let start = board.run_clock(now).max(board.motion_at(now) + ready);
         let run = Run { start, end: None, homing };
         self.run = Some(run);
         self.counts_at_start = self.counts;
         self.position_at_start = position;
         self.pending = [Pending { reset: true, forward: None }; MOTORS];
+        self.kept.begin(Default::default());
         run
+    }
+
+    /// The hardware clock at which the last driver was switched, or will be.
+    pub(super) fn switched(&self) -> Ticks {
+        self.switched.iter().fold(Ticks(0), |last, &clock| last.max(clock))
     }
 
     /// Switches a motor's driver on before its first step at `at`.
@@ -225,6 +259,17 @@ impl MotionStream {
         self.counts[motor] = self.counts[motor].wrapping_add(if self.forward[motor] { made } else { -made });
         let end = run.start + row.end;
         board.motion(motor, &Command::QueueStep { oid, interval, count, add }, due, Some(end));
+        if board.layout.has_motion_clock && !run.homing {
+            self.kept.push(motor, *row);
+        }
+    }
+
+    /// Forgets what has been made for certain.
+    pub(super) fn forget_made(&mut self, motion_now: Ticks, board: &Board) {
+        if let Some(run) = self.run {
+            let made_until = motion_now.saturating_sub(run.start).saturating_sub(board.ticks(KEPT_AFTER));
+            self.kept.forget(made_until, motion_now);
+        }
     }
 
     /// Takes up a run that the board holds.
@@ -239,32 +284,131 @@ impl MotionStream {
         run
     }
 
-    /// Gives a board that has dropped its queue the steps again that it had not made, before those that are pushed next.
-    /// `forward` is the direction that holds after them.
+    /// The board's motors stand, at rest, where they do at this position; their drivers are on.
+    pub(super) const fn stand_at(&mut self, counts: [i32; MOTORS], position: Position) {
+        self.counts = counts;
+        self.counts_at_start = counts;
+        self.position_at_start = position;
+        self.enabled = [true; MOTORS];
+    }
+
+    /// Gives a board that has dropped its queue the steps again that it had not made, before those that are pushed next:
+    /// those of a host before, whose drivers are on as far as anybody knows. `forward` is the direction that holds after
+    /// them, `from` where the board counts from.
     pub(super) fn give_again(
         &mut self,
         backlog: &[VecDeque<Row>; MOTORS],
         forward: [bool; MOTORS],
+        from: [RowPlace; MOTORS],
         board: &mut Board,
         now: Seconds,
     ) {
         let clock = board.output_clock(now);
-        for (motor, rows) in backlog.iter().enumerate() {
-            // They are on already, as far as anybody knows.
+        for motor in 0..MOTORS {
             self.switched[motor] = clock;
             Self::switch_driver(motor, true, clock, board);
+        }
+        self.begin_again(backlog.clone(), forward, from, board);
+        self.send_again(board, now);
+    }
+
+    fn begin_again(
+        &mut self,
+        rows: [VecDeque<Row>; MOTORS],
+        forward: [bool; MOTORS],
+        from: [RowPlace; MOTORS],
+        board: &Board,
+    ) {
+        self.kept.begin(from);
+        for motor in 0..MOTORS {
             self.pending[motor].reset = true;
-            self.turn(motor, rows.front().map_or(forward[motor], |row| row.forward), board);
-            for row in rows {
+            self.turn(motor, rows[motor].front().map_or(forward[motor], |row| row.forward), board);
+        }
+        self.again = rows;
+        self.again_forward = forward;
+    }
+
+    /// Sends rows again, as far as there is room.
+    pub(super) fn send_again(&mut self, board: &mut Board, now: Seconds) {
+        for motor in 0..MOTORS {
+            while board.link.room(Lane::Motion(motor as u8)) >= LANE_ROOM_MIN
+                && let Some(row) = self.again[motor].pop_front()
+            {
                 if row.forward != self.planned_forward[motor] {
                     self.turn(motor, row.forward, board);
                 }
-                self.send(motor, row, board, now);
-            }
-            if forward[motor] != self.planned_forward[motor] {
-                self.turn(motor, forward[motor], board);
+                self.send(motor, &row, board, now);
+                let after = self.again_forward[motor];
+                if self.again[motor].is_empty() && after != row.forward {
+                    self.turn(motor, after, board);
+                }
             }
         }
+    }
+
+    /// The board has dropped its queue at rest on the path, at the motion clock `at`, and says where its motors stand: what
+    /// is left of the run is put aside. Nothing where no run was being made.
+    pub(super) fn cut(
+        &mut self,
+        queues: &[MotorQueue; MOTORS],
+        at: Ticks,
+        board: &mut Board,
+    ) -> Result<Option<Cut>, PrinterError> {
+        for (motor, queue) in queues.iter().enumerate() {
+            self.counts[motor] = queue.position;
+        }
+        let Some(run) = self.run else { return Ok(None) };
+        let again = core::mem::take(&mut self.again);
+        let mut forward = self.planned_forward;
+        let mut left = self.kept.cut(queues)?;
+        for (motor, rows) in again.into_iter().enumerate() {
+            if !rows.is_empty() {
+                forward[motor] = self.again_forward[motor];
+                left.rows[motor].extend(rows);
+            }
+        }
+        let timeline = core::mem::take(&mut self.timeline);
+        let cut = Cut {
+            run,
+            at,
+            left,
+            forward,
+            made: core::array::from_fn(|motor| self.counts[motor].wrapping_sub(self.counts_at_start[motor])),
+            position_at_start: self.position_at_start,
+            elapsed: self.elapsed,
+            timeline,
+        };
+        self.abandon(board);
+        Ok(Some(cut))
+    }
+
+    /// Goes on with a run that was put aside, at the motion clock `at` of another rest: gives the moves that are to be made
+    /// of it. What else was to happen happens so much later as well.
+    pub(super) fn rejoin(&mut self, cut: Cut, at: Ticks, board: &Board) -> (Run, Vec<ScheduledMove>) {
+        let Cut { run, at: was, left, forward, made, position_at_start, elapsed, timeline } = cut;
+        let later = |clock: Ticks| Ticks((clock.0 + at.0).saturating_sub(was.0));
+        let run = Run { start: later(run.start), end: run.end.map(later), ..run };
+        self.run = Some(run);
+        self.counts_at_start = core::array::from_fn(|motor| self.counts[motor].wrapping_sub(made[motor]));
+        self.position_at_start = position_at_start;
+        self.elapsed = elapsed;
+        self.begin_again(left.rows, forward, left.from, board);
+        for (clock, speed) in left.fans {
+            self.kept.push_fan(later(clock), speed);
+        }
+        let mut moves = Vec::new();
+        for (clock, due) in timeline {
+            let due = match due {
+                Due::MoveEnd(mv) => {
+                    let mv = mv.at(later);
+                    moves.push(mv);
+                    Due::MoveEnd(mv)
+                }
+                due @ Due::Action(..) => due,
+            };
+            self.timeline.push_back((later(clock), due));
+        }
+        (run, moves)
     }
 
     /// Something happens when the board's clock gets to `at`. In the order of the clocks.
@@ -298,12 +442,18 @@ impl MotionStream {
         Some(run)
     }
 
+    /// What has not been sent would reach a board that has dropped what was before it.
+    pub(super) fn forget_unsent(board: &mut Board) {
+        (0..=FAN_LANE).for_each(|lane| board.link.forget_motion(lane as u8));
+    }
+
     /// Drops what has not been sent: the motors were stopped by something else. Whether there was a run.
     pub(super) fn abandon(&mut self, board: &mut Board) -> bool {
         for motor in 0..MOTORS {
             board.link.forget_motion(motor as u8);
         }
         self.timeline.clear();
+        self.again = Default::default();
         self.run.take().is_some()
     }
 
@@ -337,6 +487,9 @@ impl MotionStream {
     pub(super) fn covered(&self, generated_until: Option<Ticks>, board: &Board) -> Option<Ticks> {
         let run = self.run?;
         let generated = run.end.or(generated_until.map(|until| run.start + until))?;
-        Some(board.link.motion_covered().map_or(generated, |covered| covered.min(generated)))
+        let again =
+            self.again.iter().filter_map(|rows| rows.front()).map(|row| run.start + row.first()).min();
+        let waiting = board.link.motion_covered().into_iter().chain(again).min();
+        Some(waiting.map_or(generated, |waiting| waiting.min(generated)))
     }
 }

@@ -23,7 +23,7 @@ pub(crate) fn setup(board: BoardProfile) -> Setup {
 }
 
 /// Several runs of motion with turns, fan changes and filament.
-fn file() -> String {
+pub(crate) fn file() -> String {
     let mut file = String::from("G28\nM83\nG92 E0\nG1 X20 Y20 Z1 F6000\nG1 X140 E2 F3000\n");
     for layer in 0..3 {
         let _ = write!(file, "M106 S{}\nG1 Z{:.1} F600\n", 80 * (layer + 1), 1.2 + 0.2 * f64::from(layer));
@@ -69,7 +69,7 @@ fn clean(setup: &Setup, file: &str) -> (Vec<Vec<bool>>, Vec<Pulse>) {
 }
 
 /// The host is gone for good, and after a while another one connects.
-fn die(bench: &mut Bench, setup: &Setup, seconds: f64) {
+pub(crate) fn die(bench: &mut Bench, setup: &Setup, seconds: f64) {
     bench.stalled = true;
     bench.run(seconds);
     bench.stalled = false;
@@ -78,7 +78,7 @@ fn die(bench: &mut Bench, setup: &Setup, seconds: f64) {
 
 /// The new host finds the print and takes it up, which moves nothing.
 #[track_caller]
-fn take_up(bench: &mut Bench, file: &str) {
+pub(crate) fn take_up(bench: &mut Bench, file: &str) {
     bench.until("the held print", 20.0, |bench| bench.session.phase() == PhaseName::Holding);
     let pulses = bench.pulses().len();
     let journal = Journal::read(bench.journal.as_bytes()).unwrap();
@@ -91,6 +91,22 @@ fn take_up(bench: &mut Bench, file: &str) {
     assert_eq!(bench.session.job_status(), JobStatus::Held);
     let held = bench.events.iter().filter(|event| matches!(event, Event::Held(_))).count();
     assert_eq!((held, bench.errors()), (1, vec![]));
+}
+
+/// The new host finds a print that was put aside and takes it up, which moves nothing.
+#[track_caller]
+pub(crate) fn take_up_paused(bench: &mut Bench, file: &str) {
+    bench.until("the held print", 20.0, |bench| bench.session.phase() == PhaseName::Holding);
+    let pulses = bench.pulses().len();
+    let journal = Journal::read(bench.journal.as_bytes()).unwrap();
+    assert!(journal.knows(bench.session.held_print().unwrap()));
+    bench.load(file);
+    bench.session.take_up(&journal).unwrap();
+    bench.until("the plan", 20.0, |bench| bench.session.job_status() == JobStatus::Paused);
+    bench.run(2.0);
+    assert_eq!(bench.pulses().len(), pulses, "it moves by itself");
+    assert_eq!((bench.session.job_status(), bench.errors()), (JobStatus::Paused, vec![]));
+    assert!(bench.events.contains(&Event::Paused));
 }
 
 #[test]
@@ -405,7 +421,7 @@ fn a_fan_that_was_set_in_a_pause_outlives_its_host() {
     bench.ask(Request::Gcode("M106 S51".into()));
     bench.run(1.0);
     die(&mut bench, &setup, 5.0);
-    take_up(&mut bench, &file());
+    take_up_paused(&mut bench, &file());
     bench.ask(Request::Resume);
     bench.until("motion", 10.0, |bench| bench.events.contains(&Event::Resumed));
     bench.run(0.6);
@@ -430,23 +446,30 @@ fn what_is_done_by_hand_in_a_pause_is_no_print_to_be_taken_up() {
         bench.connect();
         assert_eq!(bench.session.position().unwrap().1, [false; 3]);
     }
-    // A pause in which nothing was done is as good as a hold, however long it lasts.
+    // A pause in which nothing else was done is as good as a hold, however long it lasts.
     let (expected, _) = clean(&setup, &file());
     for seconds in [1.0, 100.0, 200.0, 300.0, 3000.0] {
         let (mut bench, from) = started(&setup, &file());
         bench.run(3.0);
         bench.ask(Request::Pause);
         bench.until("the pause", 30.0, |bench| bench.session.job_status() == JobStatus::Paused);
+        let parked = bench.pulses().len();
         die(&mut bench, &setup, seconds);
-        take_up(&mut bench, &file());
+        take_up_paused(&mut bench, &file());
         bench.ask(Request::Resume);
-        let pulses = bench.pulses().len();
-        bench.until("motion", 10.0, |bench| bench.pulses().len() > pulses);
+        bench.until("going on", 30.0, |bench| {
+            bench.events.iter().any(|event| matches!(event, Event::RunResumed { .. }))
+        });
+        let back = bench.pulses().len();
+        assert!(back > parked);
         bench.job_over();
         bench.job_done();
-        // Where it was paused the run came to rest, which the clean print did not: the same number of steps.
-        let count = |steps: &[Vec<bool>]| steps.iter().map(Vec::len).collect::<Vec<_>>();
-        assert_eq!(count(&steps(&mut bench, from)), count(&expected), "{seconds}");
+        // Less those to the park position and back, the steps are the same.
+        let sums = |steps: &[Vec<bool>]| -> Vec<i64> {
+            let sum = |of: &Vec<bool>| of.iter().map(|&is| if is { 1 } else { -1 }).sum();
+            steps.iter().map(sum).collect()
+        };
+        assert_eq!(sums(&steps(&mut bench, from)), sums(&expected), "{seconds}");
     }
 }
 

@@ -9,6 +9,7 @@ mod heaters;
 mod hold;
 mod link;
 mod machine;
+mod pause;
 mod power;
 mod print;
 mod start;

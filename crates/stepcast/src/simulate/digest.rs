@@ -50,13 +50,35 @@ pub(crate) struct Digest {
     /// Where the present run's first step was; `None` while homing and before any run.
     base: Option<u64>,
     runs: u64,
+    /// The run that was put aside in a pause: where its first step was, or when it was to begin.
+    aside: Option<Aside>,
+}
+
+#[derive(Clone, Debug)]
+struct Aside {
+    base: Option<u64>,
+    ahead: VecDeque<(Ticks, bool)>,
 }
 
 impl Digest {
+    /// The present run is put aside: what is made until it goes on does not count.
+    pub(crate) fn put_aside(&mut self) {
+        let (base, ahead) = (self.base.take(), core::mem::take(&mut self.ahead));
+        self.aside = Some(Aside { base, ahead });
+    }
+
+    /// The run that was put aside goes on, so much later.
+    pub(crate) fn go_on(&mut self, by: Ticks) {
+        if let Some(Aside { base, ahead }) = self.aside.take() {
+            self.base = base.map(|base| base + by.0);
+            self.ahead = ahead.into_iter().map(|(at, homing)| (at + by, homing)).collect();
+        }
+    }
+
     /// A run of motion begins at this clock or, with its first step, somewhat later.
     pub(crate) fn expect_run(&mut self, at: Ticks, homing: bool) {
         if self.ahead.len() < RUNS_AHEAD_MAX {
-            self.ahead.push_back((at, homing));
+            self.ahead.push_back((at, homing || self.aside.is_some()));
         }
     }
 
@@ -165,6 +187,29 @@ mod tests {
         assert_eq!(one, digest([90_000, 123_456], 19, 0));
         assert_ne!(one, digest([1000, 5000], 7, 1));
         assert_eq!(one.len(), 16);
+    }
+
+    #[test]
+    fn what_is_made_in_a_pause_does_not_count() {
+        let run = |pause: Option<u64>| {
+            let mut digest = Digest::default();
+            digest.expect_run(Ticks(1000), false);
+            digest.step(0, Ticks(1100), true);
+            digest.step_end(0, Ticks(5));
+            let by = pause.unwrap_or_default();
+            if pause.is_some() {
+                digest.put_aside();
+                digest.expect_run(Ticks(1200), false);
+                digest.step(0, Ticks(1300), false);
+                digest.step_end(0, Ticks(5));
+                digest.go_on(Ticks(by));
+            }
+            digest.step(0, Ticks(1400 + by), true);
+            digest.step_end(0, Ticks(5));
+            digest.step_text()
+        };
+        assert_eq!(run(None), run(Some(0)));
+        assert_eq!(run(None), run(Some(777)));
     }
 
     #[test]

@@ -131,6 +131,8 @@ pub(crate) struct PathCheck {
     tolerance: u64,
     /// Lines that are being executed or still to come.
     segments: VecDeque<Segment>,
+    /// Lines that were put aside in a pause.
+    aside: VecDeque<Segment>,
     /// From here, for `quiet_ticks`, only the first of `segments` has to be looked at.
     quiet_from: u64,
     quiet_ticks: u64,
@@ -153,6 +155,7 @@ impl PathCheck {
             filament: 0.0,
             tolerance: clock.ticks_in(BOUNDARY_TOLERANCE).0,
             segments: VecDeque::new(),
+            aside: VecDeque::new(),
             quiet_from: 0,
             quiet_ticks: 0,
             threshold_squared: 0.0,
@@ -188,6 +191,23 @@ impl PathCheck {
             self.look_at_first();
         }
         Ok(())
+    }
+
+    /// Motion rests at `at`, and the lines that have not ended by then are put aside.
+    pub(crate) fn put_aside(&mut self, at: Ticks) {
+        self.retire(at.0);
+        self.aside = core::mem::take(&mut self.segments);
+        self.look_at_first();
+    }
+
+    /// The lines that were put aside go on, so much later.
+    pub(crate) fn go_on(&mut self, by: Ticks) {
+        for mut segment in core::mem::take(&mut self.aside) {
+            segment.start += by.0;
+            segment.end += by.0;
+            self.segments.push_back(segment);
+        }
+        self.look_at_first();
     }
 
     /// A pulse on a motor's pins; `count` is forward less backward pulses, this one included.

@@ -2,7 +2,7 @@
 
 use units::Seconds;
 
-use super::{Held, Ready, Wait};
+use super::{Held, Ready, Wait, hold::Purpose};
 use crate::{
     error::{Ended, ErrorCode, PrinterError},
     journal::MovedBy,
@@ -66,12 +66,23 @@ impl Ready {
     }
 
     pub(in crate::session) fn pause(&mut self, now: Seconds) -> Result<(), PrinterError> {
-        let Some(job) = &mut self.job else { return Err(ErrorCode::NoJob.into()) };
-        if job.state == JobState::Printing {
-            job.state = JobState::Pausing;
-            self.held = Held { wait: self.wait.hold(now), barrier: self.planner.take_barrier() };
+        let Some(job) = &self.job else { return Err(ErrorCode::NoJob.into()) };
+        if job.state != JobState::Printing {
+            return Ok(());
+        }
+        let is_held = self.hold_motion(Purpose::Pause, now);
+        if !is_held {
+            self.hold_wait(now);
+        }
+        if let Some(job) = &mut self.job {
+            job.state = if is_held { JobState::Halting } else { JobState::Pausing };
         }
         Ok(())
+    }
+
+    /// What is waited for, or is about to be, waits until the job goes on.
+    pub(super) fn hold_wait(&mut self, now: Seconds) {
+        self.held = Held { wait: self.wait.hold(now), barrier: self.planner.take_barrier() };
     }
 
     pub(in crate::session) fn cancel(&mut self, now: Seconds) -> Result<(), PrinterError> {
@@ -88,6 +99,7 @@ impl Ready {
         self.planner.drop_barrier();
         self.stop_waiting();
         self.switch_off(now);
+        self.hold_motion(Purpose::End, now);
         Ok(())
     }
 
@@ -134,13 +146,17 @@ impl Ready {
     /// does an axis whose position was not known then.
     pub(super) fn go_back(&mut self) -> Result<(), PrinterError> {
         let Some(paused) = self.job.as_ref().and_then(|job| job.paused.as_ref()) else { return Ok(()) };
-        let Paused { position, homed: was_homed, .. } = *paused;
+        let Paused { position, homed: was_homed, retracted, .. } = *paused;
         let here = self.planner.position();
         let [x, y, z] =
             core::array::from_fn(|axis| if was_homed[axis] { position[axis] } else { here[axis] });
         let (up, e) = (here[2].max(z), here[3]);
         for to in [[here[0], here[1], up, e], [x, y, up, e], [x, y, z, e]] {
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
+        }
+        if let Some(retracted) = retracted {
+            let (e, speed) = self.primed(retracted);
+            self.planner.push_raw_move([x, y, z, e], speed, gcode::LineNumber(0))?;
         }
         Ok(())
     }
@@ -161,10 +177,13 @@ impl Ready {
         let state = self.job.as_ref().map(|job| job.state.clone());
         match state {
             Some(JobState::Pausing) => self.is_paused(now),
+            Some(JobState::Parking) => self.is_parked(now),
+            // The board has yet to hold for it to go on.
+            Some(JobState::Returning) if self.is_holding() => {}
             Some(JobState::Returning) => self.has_returned(now),
             Some(JobState::Cancelling) => self.end_job(Event::JobCancelled, now),
             Some(JobState::Failing(error)) => self.end_job(Event::Error(error), now),
-            Some(JobState::Printing | JobState::Skipping) => {}
+            Some(JobState::Printing | JobState::Skipping | JobState::Halting) => {}
             Some(JobState::Paused) | None => self.idle(now),
         }
     }
@@ -183,8 +202,22 @@ impl Ready {
         let planner = Box::new(core::mem::replace(&mut self.planner, aside));
         if let Some(job) = &mut self.job {
             job.state = JobState::Paused;
-            job.paused = Some(Paused { planner, position, homed, could_extrude, targets, start: None });
+            job.paused = Some(Paused {
+                planner,
+                position,
+                homed,
+                could_extrude,
+                targets,
+                start: None,
+                cut: None,
+                retracted: None,
+            });
         }
+        self.tell_paused(now);
+    }
+
+    /// The job waits for the user, who may move the machine meanwhile.
+    pub(super) fn tell_paused(&mut self, now: Seconds) {
         self.last_active = now;
         self.console.clear();
         self.planner.adopt(&mut self.console.source);
@@ -200,6 +233,9 @@ impl Ready {
         }
         self.note_height(self.planner.position()[2], MovedBy::File);
         let Some(job) = &mut self.job else { return };
+        if job.paused.as_ref().is_some_and(|paused| paused.cut.is_some()) {
+            return self.go_on_from_rest(now);
+        }
         job.state = JobState::Printing;
         if let Some(paused) = job.paused.take() {
             self.planner = *paused.planner;

@@ -13,13 +13,11 @@ use crate::{
     error::{ErrorCode, PrinterError},
     journal::MotorQueue,
     link::SCHEDULE_AHEAD_TICKS_MAX,
-    machine::{self, MOTORS},
+    machine::MOTORS,
     planner::ExtrusionPermit,
     session::{
-        board::FAN_LANE,
         event::Event,
         job::{Job, JobState, JobStatus},
-        layout::StepperOids,
         lease::Cover,
         motion_time::{HoldReason, MotionReport, MotionState},
     },
@@ -42,7 +40,7 @@ const GAP_LONG: Seconds = Seconds(3.0);
 
 /// How far a hold is.
 #[derive(Clone, Debug)]
-enum Phase {
+pub(super) enum Phase {
     /// Motion slows down.
     Slowing,
     /// At rest: the user decides.
@@ -53,37 +51,60 @@ enum Phase {
     Rejoining { since: Seconds, asked: Seconds, answered: [bool; MOTORS] },
     /// It may go on; since when the board has been told, if it has.
     Resuming(Option<Ticks>),
-    /// The user wants to end it: the queue is dropped, and each motor says where it stands.
-    Dropping { since: Seconds, asked: Seconds, counts: [Option<i32>; MOTORS] },
+    /// The queue is dropped, and each motor says where it stands: the user wants to end it, or the job is put aside.
+    Dropping { since: Seconds, asked: Seconds, queues: [Option<MotorQueue>; MOTORS] },
     /// Nothing is queued any more; the motion clock is set going again.
     Leaving { asked: Seconds },
+}
+
+/// What motion is held for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// The board did it by itself: the user decides.
+    Ask,
+    /// The job is put aside …
+    Pause,
+    /// … and goes on where it was.
+    GoOn,
+    /// Another host has put the job aside: what that was doing with the head is broken off.
+    Parked,
+    /// What is being made is ended.
+    End,
 }
 
 /// Motion is held.
 #[derive(Clone, Debug)]
 pub(super) struct Hold {
-    phase: Phase,
+    pub(super) phase: Phase,
+    pub(super) purpose: Purpose,
     reason: HoldReason,
+    /// When the board was last told to hold, where that is this host's wish.
+    pub(super) asked: Seconds,
     /// The nozzle's temperature then, and whether it was hot enough to push filament.
     nozzle: Option<Celsius>,
     could_extrude: bool,
     /// What the heaters were set to.
     targets: Vec<(gcode::Heater, Celsius)>,
     /// The user has been told.
-    is_told: bool,
+    pub(super) is_told: bool,
     /// What the board has to be given again, where another host began.
-    rest: Option<Box<Rest>>,
+    pub(super) rest: Option<Box<Rest>>,
 }
 
 impl Hold {
     /// What comes once it is warm enough.
-    const fn warm(&self, now: Seconds) -> Phase {
+    pub(super) const fn warm(&self, now: Seconds) -> Phase {
         match &self.rest {
             Some(_) => {
                 Phase::Rejoining { since: now, asked: Seconds(f64::NEG_INFINITY), answered: [false; MOTORS] }
             }
             None => Phase::Resuming(None),
         }
+    }
+
+    /// Whether motion comes to rest because this host wants it to. Then what the board says of motion that runs is older.
+    pub(super) fn is_wanted(&self) -> bool {
+        matches!(self.phase, Phase::Slowing) && self.purpose != Purpose::Ask
     }
 }
 
@@ -108,8 +129,11 @@ impl Ready {
     pub(super) fn hold_status(&self) -> Option<JobStatus> {
         match self.hold.as_ref()?.phase {
             Phase::AtRest => Some(JobStatus::Held),
-            Phase::Dropping { .. } => Some(JobStatus::Ending),
-            Phase::Slowing
+            Phase::Dropping { .. } if self.hold.as_ref()?.purpose != Purpose::Pause => {
+                Some(JobStatus::Ending)
+            }
+            Phase::Dropping { .. }
+            | Phase::Slowing
             | Phase::Heating
             | Phase::Rejoining { .. }
             | Phase::Resuming(_)
@@ -122,7 +146,7 @@ impl Ready {
         let Some(clock) = self.board.on_motion(report, now) else { return };
         if report.state == MotionState::Running {
             if self.board.motion.is_steady() {
-                self.hold_is_over();
+                self.hold_is_over(now);
             }
             return;
         }
@@ -146,6 +170,9 @@ impl Ready {
             && at_rest
             && matches!(hold.phase, Phase::Slowing)
         {
+            if hold.purpose != Purpose::Ask {
+                return self.has_come_to_rest(now);
+            }
             let motion_now = self.board.motion_at(now);
             let has_begun = self.stream.run().is_none_or(|run| motion_now > run.start);
             if hold.reason == HoldReason::QueueDry && !has_begun {
@@ -172,6 +199,8 @@ impl Ready {
     pub(super) fn hold_for_host(&mut self, rest: Rest) {
         self.hold = Some(Hold {
             phase: Phase::Slowing,
+            purpose: Purpose::Ask,
+            asked: Seconds(f64::NEG_INFINITY),
             reason: HoldReason::HostAway,
             nozzle: None,
             could_extrude: rest.is_nozzle_on(),
@@ -181,9 +210,11 @@ impl Ready {
         });
     }
 
-    fn begin_hold(&mut self, reason: HoldReason) {
+    pub(super) fn begin_hold(&mut self, reason: HoldReason) {
         self.hold = Some(Hold {
             phase: Phase::Slowing,
+            purpose: Purpose::Ask,
+            asked: Seconds(f64::NEG_INFINITY),
             reason,
             nozzle: self.nozzle(),
             could_extrude: self.extrusion_permit() == ExtrusionPermit::Allowed,
@@ -194,13 +225,20 @@ impl Ready {
     }
 
     /// Motion goes at its full rate.
-    fn hold_is_over(&mut self) {
-        let is_over = |hold: &mut Hold| hold.rest.is_none() && !matches!(hold.phase, Phase::Dropping { .. });
+    fn hold_is_over(&mut self, now: Seconds) {
+        let is_over = |hold: &mut Hold| {
+            hold.rest.is_none() && !hold.is_wanted() && !matches!(hold.phase, Phase::Dropping { .. })
+        };
         let Some(hold) = self.hold.take_if(is_over) else {
             return;
         };
         if hold.is_told && !matches!(hold.phase, Phase::Leaving { .. }) {
             self.events.push(Event::Resumed);
+        }
+        match hold.purpose {
+            Purpose::Pause => self.park(now),
+            Purpose::Parked => self.is_parked(now),
+            Purpose::Ask | Purpose::GoOn | Purpose::End => {}
         }
     }
 
@@ -275,37 +313,6 @@ impl Ready {
         }
     }
 
-    /// Ends what is held; `false` where nothing is.
-    pub(super) fn cancel_held(&mut self, now: Seconds) -> bool {
-        let may_end = |hold: &&mut Hold| {
-            matches!(
-                hold.phase,
-                Phase::AtRest | Phase::Heating | Phase::Rejoining { .. } | Phase::Resuming(None)
-            )
-        };
-        let Some(hold) = self.hold.as_mut().filter(may_end) else { return false };
-        let asked = Seconds(f64::NEG_INFINITY);
-        hold.phase = Phase::Dropping { since: now, asked, counts: [None; MOTORS] };
-        hold.rest = None;
-        self.thermal.all_off(&mut self.board, now);
-        self.board.control(&Command::MotionDrop {});
-        if let Some(job) = self.job.as_mut().filter(|job| !job.is_ending()) {
-            job.state = JobState::Cancelling;
-        }
-        true
-    }
-
-    /// A motor's answer to a dropped queue.
-    pub(super) fn on_queue(&mut self, oid: u8, queue: &MotorQueue) {
-        let is_it = |oids: &Option<StepperOids>| oids.is_some_and(|oids| oids.stepper.0 == oid);
-        let Some(motor) = self.board.layout.steppers.iter().position(is_it) else { return };
-        match self.hold.as_mut().map(|hold| &mut hold.phase) {
-            Some(Phase::Dropping { counts, .. }) => counts[motor] = Some(queue.position),
-            Some(Phase::Rejoining { answered, .. }) => answered[motor] = true,
-            _ => {}
-        }
-    }
-
     /// Goes on with a hold.
     pub(super) fn advance_hold(&mut self, now: Seconds) -> Result<(), Failure> {
         let Some(mut hold) = self.hold.take() else { return Ok(()) };
@@ -313,6 +320,9 @@ impl Ready {
             Phase::Slowing => {
                 if let Some(rest) = &mut hold.rest {
                     rest.stop(self.lease.ramp(), &mut self.board, now);
+                } else if hold.purpose != Purpose::Ask && now - hold.asked >= ASK_AGAIN {
+                    hold.asked = now;
+                    self.tell_hold(hold.purpose);
                 }
             }
             Phase::Resuming(Some(_)) => {}
@@ -328,6 +338,9 @@ impl Ready {
                     hold.phase = Phase::Resuming(None);
                     if let Some(rest) = hold.rest.take() {
                         self.rejoin(&rest, now);
+                    }
+                    if hold.purpose != Purpose::Ask {
+                        hold.phase = Phase::Slowing;
                     }
                 } else if now - *since > ANSWER_MAX {
                     let detail = "it does not say where its motors stand";
@@ -359,21 +372,28 @@ impl Ready {
                     *told = Some(self.board.clock_at(now));
                 }
             }
-            Phase::Dropping { since, asked, counts } => {
-                let all = core::array::from_fn(|motor| match self.board.layout.steppers[motor] {
-                    Some(_) => counts[motor],
-                    None => Some(0),
-                });
-                if let [Some(x), Some(y), Some(z), Some(e)] = all {
-                    self.stand_at(&[x, y, z, e], now);
+            Phase::Dropping { since, asked, queues } => {
+                let of = |motor: usize| match self.board.layout.steppers[motor] {
+                    Some(_) => queues[motor],
+                    None => Some(MotorQueue::default()),
+                };
+                if let [Some(x), Some(y), Some(z), Some(e)] = core::array::from_fn(of) {
+                    let queues = [x, y, z, e];
                     hold.phase = Phase::Leaving { asked: Seconds(f64::NEG_INFINITY) };
+                    if hold.purpose == Purpose::Pause {
+                        self.put_aside(&queues, hold.targets.clone(), hold.could_extrude, now)?;
+                    } else if hold.purpose == Purpose::Parked {
+                        self.stand_parked(&queues.map(|queue| queue.position), now);
+                    } else {
+                        self.stand_at(&queues.map(|queue| queue.position), now);
+                    }
                 } else if now - *since > ANSWER_MAX {
                     let detail = "it does not say where its motors stand";
                     return Err(Failure::Stop(PrinterError::new(ErrorCode::LinkTimeout, detail)));
                 } else if now - *asked >= ASK_AGAIN {
                     *asked = now;
                     // Only those who have not answered: a small board has no room for all answers at once.
-                    self.board.ask_queues(|motor| counts[motor].is_none());
+                    self.board.ask_queues(|motor| queues[motor].is_none());
                 }
             }
             Phase::Leaving { asked } => {
@@ -403,6 +423,10 @@ impl Ready {
 
     /// What the board has, once it is enough to speed up on and come to rest again.
     fn cover_to_resume(&self, now: Seconds) -> Option<Cover> {
+        if self.board.clock_at(now) <= self.stream.switched() {
+            // A driver that was off comes on first.
+            return None;
+        }
         let motion_now = self.board.motion_at(now);
         let Some(run) = self.stream.run() else {
             // It was held on the last steps of a run that was taken for done.
@@ -429,30 +453,10 @@ impl Ready {
             self.lease.renew(run, cover, &mut self.board, now);
         }
     }
-
-    /// The queue has been dropped: the machine stands where its motors' counts say.
-    fn stand_at(&mut self, counts: &[i32; MOTORS], now: Seconds) {
-        let steps_mm = machine::step_distances(&self.config).map(|distance| distance.0);
-        let position = self.stream.position_of(*counts, steps_mm, &self.board);
-        self.planner.abandon_run();
-        self.board.link.forget_motion(FAN_LANE as u8);
-        if self.stream.abandon(&mut self.board) {
-            self.events.push(Event::RunBroken { at: self.board.motion_at(now) });
-        }
-        for (motor, &count) in counts.iter().enumerate() {
-            self.stream.set_count(motor, count);
-        }
-        self.planner.stand_at(position);
-        self.console.clear();
-        self.planner.correct(&mut self.console.source);
-        self.thermal.forget_fan_orders();
-        self.thermal.set_fan(0.0, None, &mut self.board, now);
-        self.lease.forget();
-    }
 }
 
 /// What the user is told of a hold.
-fn hold_error(reason: HoldReason, gap: Option<Seconds>) -> PrinterError {
+pub(super) fn hold_error(reason: HoldReason, gap: Option<Seconds>) -> PrinterError {
     match (reason, gap) {
         (HoldReason::HostAway, Some(gap)) => {
             PrinterError::new(ErrorCode::HeldHostAway, format!("it was away for {:.1} s", gap.0))

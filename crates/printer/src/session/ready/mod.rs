@@ -3,11 +3,14 @@
 //! One thing at a time: G-code comes from the job or from the console, and a barrier in it (homing, a wait) is dealt
 //! with before anything that follows.
 
+mod drop;
 mod ending;
 mod hold;
+mod pause;
 mod plan;
 mod start;
 mod take_up;
+mod take_up_parked;
 mod waiting;
 
 use gcode::LineNumber;
@@ -276,6 +279,10 @@ impl Ready {
             return self.advance_hold(now);
         }
         let motion_now = self.board.motion_at(now);
+        self.stream.forget_made(motion_now, &self.board);
+        if !self.plans_nothing() {
+            self.stream.send_again(&mut self.board, now);
+        }
         while let Some(due) = self.stream.pop_due(motion_now) {
             self.on_due(due, now);
         }

@@ -26,6 +26,9 @@ impl Ready {
             self.skip(now);
             return Ok(());
         }
+        if self.plans_nothing() {
+            return Ok(());
+        }
         self.planner.guard.extrusion = self.extrusion_permit();
         for _ in 0..PLAN_ITEMS_MAX {
             let clock_now = self.board.motion_at(now);
@@ -43,7 +46,11 @@ impl Ready {
             let stopping = self.job.as_ref().is_some_and(|job| {
                 matches!(
                     job.state,
-                    JobState::Pausing | JobState::Returning | JobState::Cancelling | JobState::Failing(_)
+                    JobState::Pausing
+                        | JobState::Parking
+                        | JobState::Returning
+                        | JobState::Cancelling
+                        | JobState::Failing(_)
                 )
             });
             if stopping && !homing {
@@ -100,6 +107,8 @@ impl Ready {
                 if !homing && self.plans_job() {
                     self.note_height(position[2], MovedBy::File);
                     self.diary.run(run.start, &mut self.board);
+                } else if homing {
+                    self.diary.lose_place(&mut self.board);
                 } else {
                     self.note_height(position[2], MovedBy::Others);
                     self.diary.other_run(&mut self.board);
@@ -136,8 +145,15 @@ impl Ready {
 
     /// A move has its place on the motion clock.
     pub(super) fn schedule_move(&mut self, planned: &PlannedMove, run: Run) {
+        let scheduled = self.scheduled(planned, run);
+        self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
+        self.events.push(Event::Move(scheduled));
+    }
+
+    /// Where a move has its place.
+    pub(super) fn scheduled(&self, planned: &PlannedMove, run: Run) -> ScheduledMove {
         let at = |time: f64| run.start + self.board.ticks(Seconds(time));
-        let scheduled = ScheduledMove {
+        ScheduledMove {
             line: planned.tag,
             start: at(planned.start_time),
             end: at(planned.end_time()),
@@ -145,9 +161,7 @@ impl Ready {
             to: planned.to,
             speed: SpeedProfile::new(planned, at),
             homing: run.homing,
-        };
-        self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
-        self.events.push(Event::Move(scheduled));
+        }
     }
 
     /// Has the journal know that Z stands there, and who moves it from here on.
@@ -193,6 +207,7 @@ impl Ready {
         match action {
             // The board itself does it at that clock.
             TimedAction::Fan { speed, .. } => {
+                self.stream.kept.push_fan(clock, speed);
                 if !self.plans_job() {
                     self.diary.input(Input::Fan(speed));
                 }

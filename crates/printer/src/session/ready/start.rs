@@ -56,6 +56,8 @@ impl Ready {
                 pulled: 0.0,
                 way: Way::Free,
             }),
+            cut: None,
+            retracted: None,
         });
         Ok(())
     }

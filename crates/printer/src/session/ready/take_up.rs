@@ -45,11 +45,14 @@ impl Ready {
     pub(in crate::session) fn take_up(
         config: PrinterConfig,
         board: Board,
-        taken: Continuation,
+        mut taken: Continuation,
         queue: &BoardQueue,
         options: JobOptions,
         now: Seconds,
     ) -> Result<Self, (Box<Board>, PrinterError)> {
+        if let Some(parked) = taken.parked {
+            return Self::take_up_parked(config, board, taken, &parked, queue, options, now);
+        }
         let motion_now = board.motion_at(now);
         let mut start = motion_now.saturating_sub(taken.made_until).nearest(taken.start);
         // A run that has come to its end is over, however long ago: of its clock only 32 bits are known.
@@ -69,6 +72,7 @@ impl Ready {
         let inverted = board.layout.steppers.map(|oids| oids.is_some_and(|oids| oids.invert_dir));
         let mut diary = Diary::default();
         diary.take_up(&taken, now);
+        let mut rest = Rest::of(&mut taken);
         let mut ready = Self::with_planner(config, board, taken.planner, now);
         let counts = queue.motors.map(|motor| motor.position);
         let made = |motor: usize| if inverted[motor] { -taken.made[motor] } else { taken.made[motor] };
@@ -81,15 +85,7 @@ impl Ready {
             position_at_start: taken.position_at_start,
             elapsed: taken.elapsed,
         });
-        let mut rest = Rest {
-            backlog: taken.backlog,
-            forward: taken.forward,
-            from: taken.from,
-            targets: taken.targets,
-            fan: taken.fan,
-            fans: Vec::new(),
-            asked: Seconds(f64::NEG_INFINITY),
-        };
+        rest.backlog = taken.backlog;
         for (at, due) in taken.timeline {
             let at = start + at;
             match due {
@@ -104,14 +100,7 @@ impl Ready {
                 TimedDue::Move(_) => {}
             }
         }
-        for &input in &taken.adopted {
-            match input {
-                Input::Target(heater, celsius) => rest
-                    .pass(&TimedAction::SetTemperature { heater: heater.heater(), target: Celsius(celsius) }),
-                Input::Fan(speed) => rest.fan = speed,
-                Input::FinishRun | Input::Speed(_) | Input::Flow(_) => {}
-            }
-        }
+        taken.adopted.iter().for_each(|&input| rest.adopt(input));
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
         job.source = taken.source;
         job.has_moved = true;
@@ -126,15 +115,47 @@ impl Ready {
     pub(super) fn rejoin(&mut self, rest: &Rest, now: Seconds) {
         let Some(run) = self.stream.run() else { return };
         self.diary.count(run.start, rest.from, &mut self.board);
-        self.stream.give_again(&rest.backlog, rest.forward, &mut self.board, now);
+        self.stream.give_again(&rest.backlog, rest.forward, rest.from, &mut self.board, now);
+        self.stream.kept.set_fan(rest.fan);
         self.thermal.set_fan(rest.fan, None, &mut self.board, now);
         for &(at, speed) in &rest.fans {
+            self.stream.kept.push_fan(at, speed);
             self.thermal.set_fan(speed, Some(at), &mut self.board, now);
         }
     }
 }
 
 impl Rest {
+    /// What heaters and fan had been told by then, with nothing to be made yet.
+    pub(super) fn of(taken: &mut Continuation) -> Self {
+        Self {
+            backlog: Default::default(),
+            forward: taken.forward,
+            from: taken.from,
+            targets: core::mem::take(&mut taken.targets),
+            fan: taken.fan,
+            fans: Vec::new(),
+            asked: Seconds(f64::NEG_INFINITY),
+        }
+    }
+
+    /// The part fan's speed.
+    pub(super) const fn fan(&self) -> f64 {
+        self.fan
+    }
+
+    /// What the user had set last.
+    pub(super) fn adopt(&mut self, input: Input) {
+        match input {
+            Input::Target(heater, celsius) => {
+                let (heater, target) = (heater.heater(), Celsius(celsius));
+                self.pass(&TimedAction::SetTemperature { heater, target });
+            }
+            Input::Fan(speed) => self.fan = speed,
+            Input::FinishRun | Input::Speed(_) | Input::Flow(_) => {}
+        }
+    }
+
     /// Whether the print had the nozzle hot.
     pub(super) fn is_nozzle_on(&self) -> bool {
         self.targets
@@ -143,7 +164,7 @@ impl Rest {
     }
 
     /// An action whose time has passed.
-    fn pass(&mut self, action: &TimedAction) {
+    pub(super) fn pass(&mut self, action: &TimedAction) {
         match *action {
             TimedAction::SetTemperature { heater, target } => {
                 self.targets.retain(|(known, _)| *known != heater);

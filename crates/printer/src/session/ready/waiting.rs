@@ -259,8 +259,7 @@ impl Ready {
             Barrier::Dwell(pause) => self.wait = Wait::Dwell { until: now + pause },
             Barrier::MotorsOff(motors) => {
                 if !self.plans_job() {
-                    // Whatever is done by hand now, a job that is paused cannot be taken up.
-                    self.diary.other_run(&mut self.board);
+                    self.diary.lose_place(&mut self.board);
                 }
                 self.stream.disable(motors, &mut self.board, now);
                 for axis in (0..3).filter(|&axis| motors[axis]) {

@@ -1,0 +1,169 @@
+//! A job that is put aside in the middle of a run of motion, on boards that can hold it: motion comes to rest on its path,
+//! the board drops what it has, and the head is parked. On the way back the head goes to where every motor stood, motion is
+//! held again, and the very same steps are given from the next one on. To the job's plan nothing has happened.
+
+use units::{Mm, MmPerS, Seconds};
+
+use super::{Failure, Ready, hold::Purpose};
+use crate::{
+    error::PrinterError,
+    journal::MotorQueue,
+    machine::{self, EXTRUDER, MOTORS},
+    planner::{ExtrusionPermit, Planner},
+    session::{
+        event::Event,
+        job::{JobState, Paused, RETURN_FEED, Retracted},
+        stream::Cut,
+    },
+};
+
+/// The filament is pulled back by this much where the machine file has no `[firmware_retraction]` …
+const RETRACT: Mm = Mm(1.0);
+/// … and so fast.
+const RETRACT_SPEED: MmPerS = MmPerS(20.0);
+
+impl Ready {
+    /// The board has dropped the run that was being made, and its motors stand where they say: the job is put aside, and
+    /// another planner moves the machine until it goes on.
+    pub(super) fn put_aside(
+        &mut self,
+        queues: &[MotorQueue; MOTORS],
+        targets: Vec<(gcode::Heater, units::Celsius)>,
+        could_extrude: bool,
+        now: Seconds,
+    ) -> Result<(), Failure> {
+        let at = self.board.motion_at(now);
+        let cut = self.stream.cut(queues, at, &mut self.board).map_err(Failure::Stop)?;
+        self.lease.forget();
+        let steps_mm = machine::step_distances(&self.config).map(|distance| distance.0);
+        let counts = queues.map(|queue| queue.position);
+        let position = match &cut {
+            Some(cut) => {
+                self.events.push(Event::RunBroken { at });
+                self.thermal.forget_fan_orders();
+                self.thermal.set_fan(cut.left.fan, None, &mut self.board, now);
+                self.stream.position_of(counts, steps_mm, &self.board)
+            }
+            None => self.planner.position(),
+        };
+        let retracted = self.retraction(position[EXTRUDER]);
+        let retract = retracted.map_or(0.0, |of| of.from - of.to);
+        self.diary.park(queues, cut.is_some(), at, retract, &mut self.board);
+        let homed = self.planner.guard.homed();
+        let mut aside = Planner::new(&self.config, self.board.clock).map_err(Failure::Stop)?;
+        aside.stand_at(position);
+        (0..3).for_each(|axis| aside.guard.set_homed(axis, homed[axis]));
+        if cut.is_none() {
+            // The run was over before motion rested: what comes next waits.
+            self.hold_wait(now);
+        }
+        let planner = Box::new(core::mem::replace(&mut self.planner, aside));
+        if let Some(job) = &mut self.job {
+            job.paused = Some(Paused {
+                planner,
+                position,
+                homed,
+                could_extrude,
+                targets,
+                start: None,
+                cut: cut.map(Box::new),
+                retracted,
+            });
+        }
+        Ok(())
+    }
+
+    /// Motion is set going again, with nothing in the board's queue: the head leaves the part.
+    pub(super) fn park(&mut self, now: Seconds) {
+        let Some(job) = self.job.as_mut().filter(|job| job.state == JobState::Halting) else { return };
+        job.state = JobState::Parking;
+        if let Err(error) = self.plan_park() {
+            self.source_failed(error, now);
+        }
+    }
+
+    /// How far the filament is pulled back, if that is possible.
+    fn retraction(&self, from: f64) -> Option<Retracted> {
+        let length = self.config.firmware_retraction.as_ref().map_or(RETRACT, |it| it.retract_length);
+        let may_retract = length > Mm(0.0)
+            && self.config.extruder.is_some()
+            && self.extrusion_permit() == ExtrusionPermit::Allowed;
+        may_retract.then_some(Retracted { from, to: from - length.0 })
+    }
+
+    /// Pulls the filament back, lifts, and goes to the place that the machine file names, as far as that is safe.
+    fn plan_park(&mut self) -> Result<(), PrinterError> {
+        let mut to = self.planner.position();
+        let homed = self.planner.guard.homed();
+        let retracted =
+            self.job.as_ref().and_then(|job| job.paused.as_ref()).and_then(|paused| paused.retracted);
+        if let Some(retracted) = retracted {
+            to[EXTRUDER] = retracted.to;
+            let speed = self.config.firmware_retraction.as_ref().map(|it| it.retract_speed);
+            self.planner.push_raw_move(to, speed.unwrap_or(RETRACT_SPEED), gcode::LineNumber(0))?;
+        }
+        if homed[2] {
+            let z_max = self.config.steppers[2].position_max.0;
+            to[2] = (to[2] + self.config.printer.pause_lift.0).min(z_max).max(to[2]);
+            self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
+            for (axis, park) in self.config.printer.pause_position.into_iter().enumerate() {
+                let stepper = &self.config.steppers[axis];
+                if let Some(park) = park.filter(|_| homed[axis]) {
+                    to[axis] = park.0.clamp(stepper.position_min.0, stepper.position_max.0);
+                }
+            }
+            self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
+        }
+        Ok(())
+    }
+
+    /// What the nozzle's filament is to be at once the head is back, in mm, and how fast it gets there.
+    pub(super) fn primed(&self, retracted: Retracted) -> (f64, MmPerS) {
+        let speed = self.config.firmware_retraction.as_ref().map(|retraction| retraction.unretract_speed);
+        let here = self.planner.position()[EXTRUDER];
+        let Retracted { from, to } = retracted;
+        // To the very step, unless somebody has moved the filament meanwhile.
+        let e = if here.to_bits() == to.to_bits() { from } else { here + (from - to) };
+        (e, speed.unwrap_or(RETRACT_SPEED))
+    }
+
+    /// The head is parked.
+    pub(super) fn is_parked(&mut self, now: Seconds) {
+        if let Some(job) = &mut self.job {
+            job.state = JobState::Paused;
+        }
+        self.tell_paused(now);
+    }
+
+    /// The head is back: motion is held once more, so that it goes on as softly as it came to rest.
+    pub(super) fn go_on_from_rest(&mut self, now: Seconds) {
+        self.hold_motion(Purpose::GoOn, now);
+    }
+
+    /// Motion is held where it was cut: the job's own planner goes on, with the next step.
+    pub(super) fn rejoin_cut(&mut self, now: Seconds) {
+        let Some(mut paused) = self.job.as_mut().and_then(|job| job.paused.take()) else { return };
+        let Some(cut) = paused.cut.take() else { return };
+        let Cut { at: broken, .. } = *cut;
+        let at = self.board.motion_at(now);
+        let (from, fans) = (cut.left.from, cut.left.fans.clone());
+        self.planner = *paused.planner;
+        let (run, moves) = self.stream.rejoin(*cut, at, &self.board);
+        if let Some(job) = &mut self.job {
+            job.state = JobState::Printing;
+        }
+        self.diary.count(run.start, from, &mut self.board);
+        self.lease.forget();
+        self.stream.send_again(&mut self.board, now);
+        let fan = self.thermal.fan_speed();
+        self.stream.kept.set_fan(fan);
+        for (clock, speed) in fans {
+            let clock = units::Ticks((clock.0 + at.0).saturating_sub(broken.0));
+            self.thermal.set_fan(speed, Some(clock), &mut self.board, now);
+        }
+        self.events.push(Event::RunResumed { broken, at });
+        for mv in moves {
+            self.events.push(Event::Move(mv));
+        }
+    }
+}

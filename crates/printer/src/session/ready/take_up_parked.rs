@@ -1,0 +1,118 @@
+//! Taking up a print that another host had put aside: the head is parked, or on its way. What that host was about to do with
+//! it is dropped at rest; then the print is paused, as it was.
+
+use std::collections::VecDeque;
+
+use units::{Clock32, Seconds, Ticks};
+
+use super::{Ready, hold::Purpose, take_up::Rest};
+use crate::{
+    config::PrinterConfig,
+    error::PrinterError,
+    journal::{BoardQueue, Continuation, Parked, TimedDue},
+    machine::{self, EXTRUDER, MOTORS},
+    planner::{Planner, TimedAction},
+    session::{
+        board::Board,
+        diary::Diary,
+        job::{Job, JobOptions, JobState, Paused, Retracted},
+        kept::Left,
+        stream::{Cut, Due, Run},
+    },
+};
+
+impl Ready {
+    /// A machine whose board counts for a print that another host has put aside. It stays paused.
+    pub(super) fn take_up_parked(
+        config: PrinterConfig,
+        board: Board,
+        mut taken: Continuation,
+        parked: &Parked,
+        queue: &BoardQueue,
+        options: JobOptions,
+        now: Seconds,
+    ) -> Result<Self, (Box<Board>, PrinterError)> {
+        let steps_mm = machine::step_distances(&config).map(|distance| distance.0);
+        let inverted = board.layout.steppers.map(|oids| oids.is_some_and(|oids| oids.invert_dir));
+        let signed = |motor: usize, steps: i32| if inverted[motor] { -steps } else { steps };
+        let position: [f64; MOTORS] = core::array::from_fn(|motor| {
+            taken.position_at_start[motor] + f64::from(taken.made[motor]) * steps_mm[motor]
+        });
+        let counts = queue.motors.map(|motor| motor.position);
+        let here: [f64; MOTORS] = core::array::from_fn(|motor| {
+            let moved = counts[motor].wrapping_sub(parked.motors[motor].position);
+            position[motor] + f64::from(signed(motor, moved)) * steps_mm[motor]
+        });
+        let planner = match Planner::new(&config, board.clock) {
+            Ok(planner) => planner,
+            Err(error) => return Err((Box::new(board), error)),
+        };
+        let mut rest = Rest::of(&mut taken);
+        let mut diary = Diary::default();
+        diary.take_up(&taken, now);
+        let mut ready = Self::with_planner(config, board, planner, now);
+        ready.diary = diary;
+        ready.planner.stand_at(here);
+        let homed = taken.planner.guard.homed();
+        (0..3).for_each(|axis| ready.planner.guard.set_homed(axis, homed[axis]));
+        ready.stream.stand_at(counts, here);
+        let run = Run { start: Ticks(0), end: taken.end, homing: false };
+        let mut cut = Cut {
+            run,
+            // Of the clocks 32 bits are known, and the rest came soon after what had been made.
+            at: taken.made_until.nearest(Clock32(parked.rest.wrapping_sub(taken.start.0))),
+            left: Left { rows: taken.backlog, from: taken.from, fan: 0.0, fans: VecDeque::new() },
+            forward: taken.forward,
+            made: core::array::from_fn(|motor| signed(motor, taken.made[motor])),
+            position_at_start: taken.position_at_start,
+            elapsed: taken.elapsed,
+            timeline: VecDeque::new(),
+        };
+        for (at, due) in taken.timeline {
+            match due {
+                TimedDue::Move(planned) if at > cut.at => {
+                    cut.timeline.push_back((at, Due::MoveEnd(ready.scheduled(&planned, run))));
+                }
+                TimedDue::Action(_, TimedAction::Fan { speed, .. }) if at > cut.at => {
+                    cut.left.fans.push_back((at, speed));
+                }
+                TimedDue::Action(line, action) if at > cut.at => {
+                    cut.timeline.push_back((at, Due::Action(line, action)));
+                }
+                TimedDue::Action(_, action) => rest.pass(&action),
+                TimedDue::Move(_) => {}
+            }
+        }
+        taken.adopted.iter().for_each(|&input| rest.adopt(input));
+        cut.left.fan = rest.fan();
+        let could_extrude = rest.is_nozzle_on() || parked.retract > 0.0;
+        let mut job = Job::new(options, machine::gcode_settings(&ready.config));
+        job.source = taken.source;
+        job.has_moved = true;
+        job.leaves_hot = rest.is_nozzle_on();
+        job.told = now;
+        job.state = JobState::Halting;
+        job.paused = Some(Paused {
+            planner: Box::new(taken.planner),
+            position,
+            homed,
+            could_extrude,
+            targets: rest.targets,
+            start: None,
+            cut: Some(Box::new(cut)),
+            retracted: retracted(parked, position[EXTRUDER], here[EXTRUDER], steps_mm[EXTRUDER]),
+        });
+        ready.job = Some(job);
+        ready.hold_motion(Purpose::Parked, now);
+        Ok(ready)
+    }
+}
+
+/// What was pulled back of the filament, as far as the other host came: to the very step, unless somebody moved it.
+fn retracted(parked: &Parked, cut: f64, here: f64, step_mm: f64) -> Option<Retracted> {
+    if parked.retract <= 0.0 {
+        return None;
+    }
+    let is_on_the_way = (cut - parked.retract - step_mm..=cut + step_mm / 2.0).contains(&here);
+    Some(Retracted { from: if is_on_the_way { cut } else { here + parked.retract }, to: here })
+}
