@@ -54,8 +54,6 @@ pub(crate) enum Scenario {
     TakeUp,
     /// The same, with a journal that is torn off somewhere
     TornJournal,
-    /// The user pauses the print, once or twice; in half of them the host dies about then, and another takes it up
-    Pause,
     /// The board starts anew
     BoardReset,
     /// A temperature sensor comes off or is short-circuited
@@ -64,6 +62,8 @@ pub(crate) enum Scenario {
     PlainHostDeath,
     /// The host of a board with plain firmware does nothing for a while
     PlainStall,
+    /// The user pauses the print, once or twice; in half of them the host dies about then, and another takes it up
+    Pause,
 }
 
 /// What has to come of it.
