@@ -4,7 +4,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-const SCENARIOS: [&str; 13] = [
+const SCENARIOS: [&str; 14] = [
     "corrupt",
     "flip",
     "drop",
@@ -18,6 +18,7 @@ const SCENARIOS: [&str; 13] = [
     "sensor_fault",
     "plain_host_death",
     "plain_stall",
+    "pause",
 ];
 
 fn campaign(arguments: &[&str]) -> (Option<i32>, Value) {
