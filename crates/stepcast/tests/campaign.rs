@@ -4,7 +4,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-const SCENARIOS: [&str; 14] = [
+const SCENARIOS: [&str; 15] = [
     "corrupt",
     "flip",
     "drop",
@@ -18,6 +18,7 @@ const SCENARIOS: [&str; 14] = [
     "sensor_fault",
     "plain_host_death",
     "plain_stall",
+    "pause",
     "power_loss",
 ];
 
@@ -49,7 +50,7 @@ fn every_promise_is_kept_whatever_happens() {
             assert!(error.is_some_and(|error| error > 0.0 && error <= error_max), "{class:#}");
         }
     }
-    let power = &classes[13];
+    let power = &classes[14];
     assert!(power["z_error_max_mm"].as_f64().is_some_and(|error| error <= 0.05), "{power:#}");
     let death = &classes[6];
     assert!(death["time_to_rest_max_s"].as_f64().is_some_and(|rest| rest <= 0.36), "{death:#}");

@@ -16,6 +16,17 @@ pub struct Faults {
     pub failures: Vec<Failure>,
     /// When the host is held up, for whoever runs the host: the printer itself does nothing about it.
     pub host_stalls: Vec<HostStall>,
+    /// When the user pauses the print, for whoever plays the user.
+    pub pauses: Vec<UserPause>,
+}
+
+/// A print that is paused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UserPause {
+    /// When the user asks for it.
+    pub at: Seconds,
+    /// How long after it has come to rest it is resumed.
+    pub lasts: Seconds,
 }
 
 /// A host that does nothing for a while: its computer sleeps, or does something else. Bytes wait meanwhile.
@@ -81,7 +92,7 @@ pub enum FailureKind {
 /// The items that [`Faults`] reads, for help texts.
 pub const FAULT_ITEMS: &str = "corrupt=P (another byte), flip=P (one bit), drop=P, duplicate=P, delay=P (probability per \
     byte), unplug@T, replug@T, outage=SECONDS@T (both), board-reset@T, power-loss=SECONDS@T (and back), sensor-open=HEATER@T, sensor-short=HEATER@T, heater-dead=HEATER@T, heater-stuck-on=HEATER@T, \
-    endstop-stuck-on=AXIS@T, endstop-stuck-off=AXIS@T, host-stall=SECONDS@T (T: seconds since power-up, 0 when left out)";
+    endstop-stuck-on=AXIS@T, endstop-stuck-off=AXIS@T, host-stall=SECONDS@T, pause=SECONDS@T (by the user, which is no fault; T: seconds since power-up, 0 when left out)";
 
 /// Why a fault cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -129,11 +140,13 @@ fn parse_item(item: &str) -> Result<Faults, &'static str> {
         *of_bytes = parse_probability(value.ok_or("the probability is missing")?)?;
         return Ok(faults);
     }
-    if matches!(name, "host-stall" | "outage" | "power-loss") {
+    if matches!(name, "host-stall" | "pause" | "outage" | "power-loss") {
         let lasts = parse_duration(value.ok_or("the duration is missing")?)?;
         let at = at.unwrap_or(Seconds::ZERO);
         if name == "host-stall" {
             faults.host_stalls.push(HostStall { at, lasts });
+        } else if name == "pause" {
+            faults.pauses.push(UserPause { at, lasts });
         } else {
             let [gone, back] = if name == "outage" {
                 [FailureKind::Unplug, FailureKind::Replug]
@@ -200,6 +213,7 @@ impl AddAssign for Faults {
         }
         self.failures.extend(other.failures);
         self.host_stalls.extend(other.host_stalls);
+        self.pauses.extend(other.pauses);
     }
 }
 
@@ -255,6 +269,8 @@ mod tests {
         assert_eq!(faults.failures, expected);
         faults += "host-stall=2.5@30".parse().expect("a fault");
         assert_eq!(faults.host_stalls, [HostStall { at: Seconds(30.0), lasts: Seconds(2.5) }]);
+        faults += "pause=4@31".parse().expect("a pause");
+        assert_eq!(faults.pauses, [UserPause { at: Seconds(31.0), lasts: Seconds(4.0) }]);
         let outage: Faults = "outage=1.5@10,board-reset@20,flip=0.5".parse().expect("faults");
         let expected =
             [(10.0, FailureKind::Unplug), (11.5, FailureKind::Replug), (20.0, FailureKind::BoardReset)];
@@ -276,6 +292,7 @@ mod tests {
             ("unplug=x@3", "no name"),
             ("outage@3", "missing"),
             ("power-loss@3", "missing"),
+            ("pause@3", "missing"),
             ("unplug@soon", "seconds"),
             ("fire", "no such fault"),
             ("host-stall@3", "missing"),

@@ -31,7 +31,7 @@ mod switch;
 mod thermistor;
 mod wiring;
 
-pub use faults::{ByteFaults, FAULT_ITEMS, Failure, FailureKind, FaultError, Faults, HostStall};
+pub use faults::{ByteFaults, FAULT_ITEMS, Failure, FailureKind, FaultError, Faults, HostStall, UserPause};
 pub use heater::{Plant, Sensor};
 pub use machine::{
     ENDSTOPS_MAX, Endstop, Fan, Filament, Heater, MOTORS_MAX, Machine, Motor, Wire, WiringError,

@@ -83,6 +83,12 @@ impl RoundTrip {
         ALLOWANCE * self.floor
     }
 
+    /// Hardly an answer comes sooner than this after what caused it, in seconds.
+    pub(super) fn usual_answer_s_min(&self) -> f64 {
+        const ALLOWANCE: f64 = 0.8;
+        ALLOWANCE * self.smoothed.unwrap_or(0.0)
+    }
+
     /// No answer comes later than this after what caused it, in seconds.
     pub(super) fn answer_s_max(&self) -> f64 {
         self.smoothed.map_or(RTO_S_MIN, |smoothed| smoothed + 4.0 * self.variation)

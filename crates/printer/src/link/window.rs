@@ -107,6 +107,8 @@ pub(super) struct Window {
     transmissions: u64,
     /// The place of the transmission that the next answer belongs to.
     unanswered: u64,
+    /// So many answers were given up and may come after all.
+    late_answers: u64,
     /// The board asked for the front again.
     send_again: bool,
     /// The board asked for the front, but perhaps before it was sent for the last time.
@@ -140,6 +142,7 @@ impl Window {
             resent_below: 0,
             transmissions: 0,
             unanswered: 0,
+            late_answers: 0,
             send_again: false,
             suspect: false,
             last_progress_s: 0.0,
@@ -287,7 +290,10 @@ impl Window {
             self.round_trip.timed_out();
         }
         if !self.send_again {
-            // Whatever has not been answered by now will not be.
+            // Whatever has not been answered by now will not be, or late: the line may only hold bytes up. Such an answer
+            // looks as if what is sent now had been lost; taken so, it fills the line with repetitions, and what is
+            // answered then comes later still.
+            self.late_answers = self.transmissions - self.unanswered;
             self.unanswered = self.transmissions;
         }
         self.loss.lost();
@@ -376,8 +382,10 @@ impl Window {
         let place = self.unanswered;
         self.unanswered = (place + 1).min(self.transmissions);
         let age_s = now_s - front.last_s;
+        let is_late = self.late_answers > 0 && age_s < self.round_trip.usual_answer_s_min();
+        self.late_answers = if is_late { self.late_answers - 1 } else { 0 };
         let answers_front =
-            place >= self.latest(self.expected).place && age_s >= self.round_trip.answer_s_min();
+            place >= self.latest(self.expected).place && age_s >= self.round_trip.answer_s_min() && !is_late;
         if answers_front {
             self.send_again = true;
         } else {

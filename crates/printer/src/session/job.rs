@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use gcode::Settings;
-use units::{MmPerS, Seconds};
+use units::{MmPerS, Seconds, Ticks};
 
 use super::stream::Cut;
 use crate::{
@@ -94,7 +94,9 @@ pub(super) struct Paused {
     pub(super) targets: Vec<(gcode::Heater, units::Celsius)>,
     /// Where it begins in the middle of its file.
     pub(super) start: Option<Start>,
-    /// The rest of the run of motion that it was in, where it was paused on its path …
+    /// The motion clock of the rest, where motion was held for the pause.
+    pub(super) rest: Option<Ticks>,
+    /// What is left of the run of motion that it was in, where it was paused on its path …
     pub(super) cut: Option<Box<Cut>>,
     /// … and what was pulled back of the filament.
     pub(super) retracted: Option<Retracted>,

@@ -153,11 +153,11 @@ impl Lease {
         let alive = board.clock_at(now) + board.ticks(ALIVE);
         let ramp = board.ticks(ramp).0 as u32;
         board.control(&Command::MotionLease { covered: covered.low().0, alive: alive.low().0, ramp });
-        let had_end = self.told.is_some_and(|told| told.has_end);
-        if cover.is_end && !had_end {
+        if cover.is_end {
+            // Again and again: a board that came to rest on its last steps has ended the lease, and forgotten where it ends.
             board.control(&Command::MotionEnd { clock: cover.until.low().0 });
         }
-        let has_end = cover.is_end || had_end;
+        let has_end = cover.is_end || self.told.is_some_and(|told| told.has_end);
         self.told = Some(Told { at: now, covered, alive, has_end, at_start: false });
     }
 

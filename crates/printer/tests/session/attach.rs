@@ -424,6 +424,7 @@ fn a_fan_that_was_set_in_a_pause_outlives_its_host() {
     take_up_paused(&mut bench, &file());
     bench.ask(Request::Resume);
     bench.until("motion", 10.0, |bench| bench.events.contains(&Event::Resumed));
+    bench.run(0.6);
     let fan = bench.state().fans[0].duty;
     assert!((fan - 0.2).abs() < 0.01, "{fan}");
     bench.job_over();

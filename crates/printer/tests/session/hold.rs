@@ -300,6 +300,39 @@ fn a_stall_at_the_end_of_a_run_loses_nothing() {
     }
 }
 
+/// The board comes to rest on a run's very last steps, or a little after: there is next to nothing left to go on with.
+#[test]
+fn a_hold_on_the_last_steps_of_a_run_can_be_ended() {
+    let setup = setup(BoardProfile::rp2040());
+    let started = |file: &str| {
+        let mut bench = setup.ready();
+        bench.start(file);
+        let homed = |event: &Event| matches!(event, Event::Homed { axis: 2, .. });
+        bench.until("homed", 100.0, |bench| bench.events.iter().any(homed));
+        let known = bench.pulses().len();
+        bench.until("motion", 100.0, |bench| bench.pulses().len() > known);
+        bench
+    };
+    let mut held = 0;
+    // The lease is renewed every 0.15 s: its end falls everywhere between the renewals.
+    for hundredths in 0..15 {
+        let x = 30.0 + 0.5 * f64::from(hundredths);
+        let file = format!("{START}G1 X140 F3000\nG1 X{x}\n{END}");
+        let mut bench = started(&file);
+        let began = bench.age();
+        bench.until("the end", 100.0, |bench| bench.events.contains(&Event::JobDone));
+        let lasts = bench.age() - began;
+        for renewals in 0..6 {
+            let mut bench = started(&file);
+            bench.run(lasts - 2.6 + 0.15 * f64::from(renewals));
+            stall(&mut bench, 3.0);
+            finish(&mut bench);
+            held += holds(&bench).len();
+        }
+    }
+    assert!((5..90).contains(&held), "{held}");
+}
+
 /// Resumes whatever is held, until the job is over.
 #[track_caller]
 fn finish(bench: &mut Bench) {

@@ -101,6 +101,13 @@ impl Judging<'_> {
             finding.wrong_resumes += u32::from(report.holds > 0);
             finding.broken.push("the pulses are not those of the clean print".to_owned());
         }
+        let aftermath = &self.print.aftermath;
+        if let Some(rest) = aftermath.pause_rest {
+            finding.time_to_rest_s = Some(self.clock.duration_of(rest).0);
+        }
+        if aftermath.pause_is_late {
+            finding.broken.push("a pause took longer to rest than its ramp".to_owned());
+        }
         let holds_max = u32::from(!edges);
         if report.holds > holds_max {
             finding.broken.push(format!("{} holds, at most {holds_max} expected", report.holds));

@@ -299,6 +299,9 @@ fn faults_text(case: &Case) -> String {
     for stall in &case.faults.host_stalls {
         let _ = write!(text, "host-stall={:.4}@{:.4} ", stall.lasts.0, stall.at.0);
     }
+    for pause in &case.faults.pauses {
+        let _ = write!(text, "pause={:.4}@{:.4} ", pause.lasts.0, pause.at.0);
+    }
     if let Some(at) = case.host_dies {
         let _ = write!(text, "the host dies@{:.4} ", at.0);
     }

@@ -6,7 +6,7 @@
 use clap::ValueEnum;
 use serde::Serialize;
 use units::Seconds;
-use virtual_printer::{BoardProfile, ByteFaults, Failure, FailureKind, Faults, HostStall};
+use virtual_printer::{BoardProfile, ByteFaults, Failure, FailureKind, Faults, HostStall, UserPause};
 
 use super::chance::Chance;
 
@@ -20,6 +20,12 @@ const STALL_S: std::ops::Range<f64> = 0.1..60.0;
 const STALL_SHORT_S: f64 = 1.7;
 /// Stalls that a plain board does not sit out.
 const STALL_PLAIN_S: std::ops::Range<f64> = 3.5..60.0;
+/// Pauses, from the rest to the user's word …
+const PAUSE_S: std::ops::Range<f64> = 0.0..20.0;
+/// … another one so long after the first was asked for …
+const PAUSE_AGAIN_S: std::ops::Range<f64> = 0.0..40.0;
+/// … and a host that dies about then.
+const DEATH_AROUND_S: std::ops::Range<f64> = 0.0..15.0;
 /// A host's place is empty for so long.
 const AWAY_S: std::ops::Range<f64> = 0.01..600.0;
 /// The user says yes so long after a hold was shown.
@@ -56,6 +62,8 @@ pub(crate) enum Scenario {
     PlainHostDeath,
     /// The host of a board with plain firmware does nothing for a while
     PlainStall,
+    /// The user pauses the print, once or twice; in half of them the host dies about then, and another takes it up
+    Pause,
     /// The power goes, and the print is gone on with from a line
     PowerLoss,
 }
@@ -128,6 +136,7 @@ impl Scenario {
             | Self::HostDeath
             | Self::TakeUp
             | Self::TornJournal
+            | Self::Pause
             | Self::BoardReset
             | Self::SensorFault => Some(false),
         }
@@ -161,6 +170,7 @@ impl Scenario {
                 case.consent_after = Some(Seconds(chance.between(CONSENT_S)));
                 case.promise = if torn { Promise::SameStepsOrRefused } else { Promise::SameSteps };
             }
+            Self::Pause => Self::pause(&mut case, at, chance),
             // What happens there has a judge of its own.
             Self::PowerLoss => {}
             Self::BoardReset | Self::SensorFault => {
@@ -185,6 +195,22 @@ impl Scenario {
         };
         *of = hit;
         bytes
+    }
+
+    fn pause(case: &mut Case, at: Seconds, chance: &mut Chance) {
+        let mut ask = |at: Seconds, chance: &mut Chance| {
+            case.faults.pauses.push(UserPause { at, lasts: Seconds(chance.between(PAUSE_S)) });
+        };
+        ask(at, chance);
+        if chance.part() < 0.5 {
+            ask(at + Seconds(chance.between(PAUSE_AGAIN_S)), chance);
+        }
+        if chance.part() < 0.5 {
+            case.host_dies = Some(at + Seconds(chance.between(DEATH_AROUND_S)));
+            case.successor = Some((Seconds(chance.magnitude(AWAY_S)), 1.0));
+            case.consent_after = Some(Seconds(chance.between(CONSENT_S)));
+        }
+        (case.promise, case.at) = (Promise::SameSteps, Some(at));
     }
 
     fn stall(self, case: &mut Case, at: Seconds, chance: &mut Chance) {

@@ -9,6 +9,7 @@ mod gcode_path;
 mod lease_tap;
 mod observer;
 mod path_check;
+mod pauses;
 mod report;
 mod run;
 mod tally;

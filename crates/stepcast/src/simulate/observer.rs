@@ -226,7 +226,9 @@ impl Observer {
                 tally.path.set_position(EXTRUDER, from[EXTRUDER]);
             }
         }
-        self.plan_steps(scheduled);
+        if self.aside.is_none() {
+            self.plan_steps(scheduled);
+        }
         let mut piece = Piece { line, from, to, bulge_mm: 0.0 };
         if !homing {
             self.moves += 1;
@@ -249,12 +251,22 @@ impl Observer {
         }
     }
 
-    /// The present run is put aside in a pause.
+    /// Whether a run has been put aside.
+    pub(super) const fn is_aside(&self) -> bool {
+        self.aside.is_some()
+    }
+
+    /// The present run is put aside in a pause; what is made until it goes on, and may be broken off, is not the file's.
     fn put_aside(&mut self, at: Ticks, printer: &mut VirtualPrinter<Tally>) {
         let at = self.clock_of(at, printer);
+        if self.aside.is_some() {
+            return printer.recorder_mut().path.forget(at);
+        }
         let (run_start, told_until) = (self.run_start.take(), self.told_until);
         self.aside = Some(Aside { at, run_start, told_until });
+        self.told_until = at;
         let tally = printer.recorder_mut();
+        tally.is_aside = true;
         tally.digest.put_aside();
         tally.path.put_aside(at);
     }
@@ -268,6 +280,7 @@ impl Observer {
         self.told_until = aside.told_until + by;
         self.repeats = true;
         let tally = printer.recorder_mut();
+        tally.is_aside = false;
         tally.digest.go_on(by);
         tally.path.go_on(by);
     }

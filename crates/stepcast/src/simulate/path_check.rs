@@ -200,6 +200,13 @@ impl PathCheck {
         self.look_at_first();
     }
 
+    /// Motion rests at `at`, and the lines that have not ended by then will not be executed.
+    pub(crate) fn forget(&mut self, at: Ticks) {
+        self.retire(at.0);
+        self.segments.clear();
+        self.look_at_first();
+    }
+
     /// The lines that were put aside go on, so much later.
     pub(crate) fn go_on(&mut self, by: Ticks) {
         for mut segment in core::mem::take(&mut self.aside) {

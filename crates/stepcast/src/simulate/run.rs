@@ -20,6 +20,7 @@ use super::{
     lease_tap::LeaseTap,
     observer::{Observer, Wish},
     own_error,
+    pauses::{Pauses, Wanted},
     report::{After, Motor, Outcome, Report},
     tally::Tally,
 };
@@ -38,6 +39,8 @@ const WAKE_MIN: Seconds = Seconds(50e-6);
 pub(super) const AFTER: Seconds = Seconds(6.0);
 /// A print in which nothing happens for so long is given up.
 const STALL_MAX: Seconds = Seconds(6.0 * 3600.0);
+/// A pause rests so much later than its ramp at most.
+const PAUSE_SPARE: Seconds = Seconds(0.2);
 /// How often the nozzle's temperature is looked at.
 const SAMPLE_INTERVAL: Seconds = Seconds(0.1);
 /// The nozzle counts as extruding for so long after a step of the extruder's.
@@ -133,6 +136,10 @@ pub(crate) struct Aftermath {
     pub(crate) overheated: Ticks,
     /// Motion that began again without the user's word after a hold was shown.
     pub(crate) restarts: u32,
+    /// The longest time from the user's wish for a pause to the last step before it, and whether any was longer than the
+    /// ramp and a little.
+    pub(crate) pause_rest: Option<Ticks>,
+    pub(crate) pause_is_late: bool,
     /// The end of the job, before the machine was watched.
     pub(crate) ended: Ticks,
     /// The pulses that came while no line was being executed.
@@ -163,6 +170,7 @@ pub(crate) struct Simulation {
     journal: String,
     /// When the host does nothing: from and until when; soonest last.
     stalls: Vec<(Ticks, Ticks)>,
+    pauses: Pauses,
     stage: Stage,
     watched: Seconds,
     time_max: Option<Seconds>,
@@ -231,6 +239,7 @@ impl Simulation {
             config,
             journal: String::new(),
             stalls: stalls(&faults.host_stalls, start, host_hz),
+            pauses: Pauses::new(&faults.pauses, start, host_hz),
             stage: Stage::Connecting,
             watched,
             time_max,
@@ -300,7 +309,7 @@ impl Simulation {
                 self.printer.write(to_board);
                 to_board.clear();
             }
-            let acted = self.take_events(now) | self.consent(now) | self.set_out(now);
+            let acted = self.take_events(now) | self.consent(now) | self.set_out(now) | self.pause(now);
             let fed = self.feed()?;
             if !acted && !fed {
                 let queued = self.session.motion_queued(now);
@@ -308,8 +317,8 @@ impl Simulation {
                 if let Some(ahead) = queued {
                     self.course.queued(ahead);
                 }
-                let consent = self.consent_at.map(|at| self.clock.at(at));
-                return Ok(consent.map_or(wake, |consent| wake.min(consent)));
+                let users = self.consent_at.into_iter().chain(self.pauses.next()).min();
+                return Ok(users.map_or(wake, |at| wake.min(self.clock.at(at))));
             }
         }
     }
@@ -318,7 +327,9 @@ impl Simulation {
     fn take_events(&mut self, now: Seconds) -> bool {
         let mut acted = false;
         for event in self.session.take_events() {
-            let Some(wish) = self.observer.take(event, &mut self.printer) else { continue };
+            let wish = self.observer.take(event, &mut self.printer);
+            self.note_rest();
+            let Some(wish) = wish else { continue };
             acted = true;
             let result = match wish {
                 Wish::Start if self.stage == Stage::Connecting => {
@@ -338,7 +349,10 @@ impl Simulation {
                     self.homes = true;
                     self.session.request(Request::Gcode("G28 Z".to_owned()), now)
                 }
-                Wish::Resume => self.session.request(Request::Resume, now),
+                Wish::Resume => {
+                    self.pauses.is_paused(self.printer.now());
+                    Ok(())
+                }
                 Wish::End => {
                     self.end();
                     Ok(())
@@ -381,6 +395,7 @@ impl Simulation {
         self.journal.truncate(kept);
         self.session = Session::new(self.config.clone(), self.clock.at(now));
         self.observer.is_taken_up = true;
+        self.pauses.host_is_gone();
         None
     }
 
@@ -406,6 +421,31 @@ impl Simulation {
         // It is refused until the axis is at rest.
         self.homes = self.session.request(Request::Resume, now).is_err();
         !self.homes
+    }
+
+    /// Notes how long a pause took to come to rest, where it has.
+    fn note_rest(&mut self) {
+        let is_aside = self.observer.is_aside();
+        let Some(asked) = self.pauses.since.take_if(|_| is_aside) else { return };
+        let took = self.printer.recorder().last_step.unwrap_or_default().saturating_sub(asked);
+        self.aftermath.pause_rest = self.aftermath.pause_rest.max(Some(took));
+        self.aftermath.pause_is_late |= took > self.lease.hold_ramp() + self.ticks(PAUSE_SPARE);
+    }
+
+    /// The user pauses the print, or resumes it, where that is due.
+    fn pause(&mut self, now: Seconds) -> bool {
+        let Some(wanted) = self.pauses.take(self.printer.now()) else { return false };
+        let result = match wanted {
+            // There may be nothing to be paused.
+            Wanted::Pause => self.session.request(Request::Pause, now).or(Ok(())),
+            Wanted::Resume if self.stage != Stage::Printing => Ok(()),
+            Wanted::Resume => self.session.request(Request::Resume, now),
+        };
+        if let Err(error) = result {
+            self.observer.error.get_or_insert(error);
+            self.end();
+        }
+        true
     }
 
     fn end(&mut self) {

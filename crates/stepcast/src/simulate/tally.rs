@@ -14,6 +14,8 @@ use super::{digest::Digest, path_check::PathCheck};
 pub(crate) struct Tally {
     /// Pulses of each motor, both directions.
     pub(crate) pulses: [u64; MOTORS],
+    /// They are those of a pause, which are not counted.
+    pub(crate) is_aside: bool,
     /// The path that they draw.
     pub(crate) path: PathCheck,
     /// Their fingerprint.
@@ -33,6 +35,7 @@ impl Tally {
     pub(crate) fn new(step_distance_mm: [f64; MOTORS], clock: Hertz) -> Self {
         Self {
             pulses: [0; MOTORS],
+            is_aside: false,
             path: PathCheck::new(step_distance_mm, clock),
             digest: Digest::default(),
             extruded_at: None,
@@ -47,7 +50,7 @@ impl Recorder for Tally {
     #[inline]
     fn step(&mut self, motor: usize, at: Ticks, forward: bool, count: i64) {
         let Some(pulses) = self.pulses.get_mut(motor) else { return };
-        *pulses += 1;
+        *pulses += u64::from(!self.is_aside);
         self.last_step = Some(at);
         if motor == EXTRUDER && forward {
             self.extruded_at = Some(at);

@@ -110,6 +110,7 @@ impl Ready {
 
     /// The head of a job that another host had put aside stands where its motors' counts say.
     pub(super) fn stand_parked(&mut self, counts: &[i32; MOTORS], now: Seconds) {
+        self.events.push(Event::RunBroken { at: self.board.motion_at(now) });
         self.stand_at(counts, now);
         let cut = self.job.as_ref().and_then(|job| job.paused.as_ref()).and_then(|it| it.cut.as_ref());
         if let Some(fan) = cut.map(|cut| cut.left.fan) {

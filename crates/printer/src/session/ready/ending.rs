@@ -209,6 +209,7 @@ impl Ready {
                 could_extrude,
                 targets,
                 start: None,
+                rest: None,
                 cut: None,
                 retracted: None,
             });
@@ -239,6 +240,9 @@ impl Ready {
         job.state = JobState::Printing;
         if let Some(paused) = job.paused.take() {
             self.planner = *paused.planner;
+            if let Some(broken) = paused.rest {
+                self.events.push(Event::RunResumed { broken, at: self.board.motion_at(now) });
+            }
             if let Some(start) = paused.start {
                 self.thermal.set_fan(start.fan, None, &mut self.board, now);
             }

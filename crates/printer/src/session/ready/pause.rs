@@ -35,11 +35,11 @@ impl Ready {
         let at = self.board.motion_at(now);
         let cut = self.stream.cut(queues, at, &mut self.board).map_err(Failure::Stop)?;
         self.lease.forget();
+        self.events.push(Event::RunBroken { at });
         let steps_mm = machine::step_distances(&self.config).map(|distance| distance.0);
         let counts = queues.map(|queue| queue.position);
         let position = match &cut {
             Some(cut) => {
-                self.events.push(Event::RunBroken { at });
                 self.thermal.forget_fan_orders();
                 self.thermal.set_fan(cut.left.fan, None, &mut self.board, now);
                 self.stream.position_of(counts, steps_mm, &self.board)
@@ -66,6 +66,7 @@ impl Ready {
                 could_extrude,
                 targets,
                 start: None,
+                rest: Some(at),
                 cut: cut.map(Box::new),
                 retracted,
             });

@@ -56,6 +56,7 @@ impl Ready {
                 pulled: 0.0,
                 way: Way::Free,
             }),
+            rest: None,
             cut: None,
             retracted: None,
         });

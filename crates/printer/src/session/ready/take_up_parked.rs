@@ -99,6 +99,7 @@ impl Ready {
             could_extrude,
             targets: rest.targets,
             start: None,
+            rest: None,
             cut: Some(Box::new(cut)),
             retracted: retracted(parked, position[EXTRUDER], here[EXTRUDER], steps_mm[EXTRUDER]),
         });
