@@ -17,6 +17,7 @@ use virtual_printer::BoardProfile;
 use self::{
     part::{Heights, Laid, OFF_MAX_MM},
     rig::Rig,
+    trace::Doing,
 };
 use super::{chance::Chance, judge::Finding, window::Window};
 
@@ -97,9 +98,13 @@ pub(super) fn run(
         stepper.second_homing_speed = stepper.second_homing_speed.min(SECOND_HOMING);
     }
     let mut clean = Rig::new(config.clone(), board, window.gcode.clone(), None, seed)?;
-    let began = clean.print()?;
-    let loss = Loss::new(began, clean.age(), chance);
-    let clean = Laid::of(&clean.way());
+    clean.print()?;
+    let (ended, way) = (clean.age(), clean.way());
+    let first = way.iter().find(|(_, doing)| matches!(doing, Doing::Line { .. }));
+    let first = first.map_or(clean.printer.start(), |(sample, _)| sample.at);
+    let began = board.clock.duration_of(first.saturating_sub(clean.printer.start()));
+    let loss = Loss::new(began, ended, chance);
+    let clean = Laid::of(&way);
     let about = loss.text();
     let finding = interrupted(&config, window, board, seed, &loss, &clean)
         .unwrap_or_else(|error| Finding { broken: vec![format!("{error:#}")], ..Finding::default() });

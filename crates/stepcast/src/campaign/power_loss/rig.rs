@@ -206,20 +206,15 @@ impl Rig {
         Ok(())
     }
 
-    /// Prints the file from its beginning, to its end or until the power goes. When it began, in s since power-up.
-    pub(super) fn print(&mut self) -> anyhow::Result<Seconds> {
+    /// Prints the file from its beginning, to its end or until the power goes.
+    pub(super) fn print(&mut self) -> anyhow::Result<()> {
         self.until("the board", |rig| rig.session.phase() == PhaseName::Ready)?;
         self.start(1, None)?;
-        let mut began = None;
-        let result = self.until("the end of the print", |rig| {
-            if began.is_none() && rig.session.motion_queued(rig.now()).is_some() {
-                began = Some(rig.age());
-            }
+        self.until("the end of the print", |rig| {
             let is_gone = rig.host_dies.is_some_and(|dies| rig.printer.now() >= dies);
             let is_lost = rig.error.is_some() && rig.loses.is_some_and(|at| rig.age() >= at);
             rig.is_done || is_gone || is_lost
-        });
-        result.map(|()| began.unwrap_or_default())
+        })
     }
 
     /// What was done so far; then that begins anew.
