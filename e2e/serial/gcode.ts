@@ -77,3 +77,36 @@ export function climbing(seconds: number, isCold = true): string {
   });
   return [...lines.slice(0, at), ...layers, 'M107', ...lines.slice(-3)].join('\n');
 }
+
+/** A tower of square walls, and what there is to know of its layers. */
+export interface Tower {
+  readonly gcode: string;
+  /** Of a layer, counted from 1: the line that announces it. */
+  readonly lineOf: (layer: number) => number;
+  /** Its height, mm. */
+  readonly zOf: (layer: number) => number;
+  readonly corners: readonly (readonly [number, number])[];
+}
+
+/** Hot, with retractions and ways between layers; a layer takes about three seconds. */
+export function tower(layers: number): Tower {
+  const corners = [
+    [80, 80],
+    [120, 80],
+    [120, 120],
+    [80, 120],
+    [80, 80.5],
+  ] as const;
+  const lines = ['M140 S60', 'M104 S200', 'G28', 'G90', 'M83', 'G1 Z5 F600', 'M109 S200', 'M106 S128'];
+  const starts: number[] = [];
+  const zOf = (layer: number): number => Number((layer * 0.2).toFixed(2));
+  for (let layer = 1; layer <= layers; layer += 1) {
+    starts.push(lines.length + 1);
+    const [[x, y], ...sides] = corners;
+    lines.push(';LAYER_CHANGE', `;Z:${zOf(layer)}`, 'G1 E-0.8 F2400', `G1 Z${zOf(layer)} F600`);
+    lines.push(`G1 X${x} Y${y} F6000`, 'G1 E0.8 F2400', 'G1 F3600');
+    lines.push(...sides.map(([x, y]) => `G1 X${x} Y${y} E1.33`));
+  }
+  lines.push('G1 E-0.8 F2400', `G1 Z${zOf(layers) + 5} F600`, 'M104 S0', 'M140 S0', 'M107');
+  return { gcode: `${lines.join('\n')}\n`, lineOf: (layer) => starts[layer - 1] ?? 0, zOf, corners };
+}

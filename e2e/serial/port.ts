@@ -209,6 +209,12 @@ export class BridgePort {
     this.#pass();
   }
 
+  /** From now on so many of the device's seconds pass in a real one, at most. */
+  setSpeed(speed: number): void {
+    this.#speed = speed;
+    this.#reanchor();
+  }
+
   /** From now on realm and device go on in real time, each by its own clock. */
   goOnInRealTime(): void {
     this.#speed = 1;

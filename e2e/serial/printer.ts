@@ -8,18 +8,22 @@ export interface Sample {
   readonly timeS: number;
   /** X, Y, Z, extruder: pulses so far, both ways. */
   readonly pulses: readonly number[];
+  /** The same: where the loads stand. */
+  readonly mm: readonly number[];
 }
 
 export interface PrinterOptions {
   readonly config?: string;
   readonly seed?: number;
   readonly faults?: string;
+  /** Its motors are looked at so often, s. */
+  readonly sampleS?: number;
   /** The rate of its UART; at another one both sides get noise. Left out: USB, any rate. */
   readonly baudRate?: number;
 }
 
 const SAMPLE_S = 0.5;
-const SAMPLES_MAX = 20_000;
+const SAMPLES_MAX = 100_000;
 
 /** What a UART makes of bytes at another rate: bytes that have little to do with them, but always the same. */
 const garbled = (bytes: Uint8Array): Uint8Array =>
@@ -79,9 +83,10 @@ export class PrinterDevice implements Device {
   }
 
   #sample(): void {
-    this.#nextSample = this.now() + SAMPLE_S;
-    const pulses = this.state().motors.map((motor) => motor.pulses);
-    this.samples.push({ timeS: this.now(), pulses });
+    this.#nextSample = this.now() + (this.#options.sampleS ?? SAMPLE_S);
+    const { motors } = this.state();
+    const pulses = motors.map((motor) => motor.pulses);
+    this.samples.push({ timeS: this.now(), pulses, mm: motors.map((motor) => motor.position_mm) });
     if (this.samples.length > SAMPLES_MAX) this.samples.shift();
   }
 }

@@ -57,6 +57,18 @@ async function walk(panel: Panel, makeFile: MakeFile): Promise<void> {
   await panel.job.getByRole('checkbox', { name: /Line 1\b/ }).check();
   await expect(panel.print).toBeEnabled();
   await look('a file is loaded');
+  await panel.job.getByRole('button', { name: 'Print from a line…' }).click();
+  const begin = page.getByRole('dialog', { name: 'Print from a line' });
+  await expect(begin.locator('[aria-current="true"]')).not.toBeEmpty();
+  await look('where a print is to begin');
+  await begin.getByRole('textbox', { name: /^Line/ }).fill('40');
+  await begin.getByRole('textbox', { name: /^Line/ }).press('Enter');
+  await begin.getByRole('button', { name: /^Get ready at line 40/ }).click();
+  await expect(panel.status).toContainText('Paused');
+  await look('what there is to do before it begins');
+  await panel.job.getByRole('button', { name: 'Cancel' }).click();
+  await panel.answer('End the print?', 'End the print');
+  await expect(panel.job).toContainText('The print was cancelled.');
   await panel.startPrint();
   await look('printing');
   await panel.job.getByRole('button', { name: 'Cancel' }).click();
@@ -72,7 +84,7 @@ for (const theme of ['light', 'dark'] as const)
     test.describe(`${theme}, ${size}`, () => {
       test.use({ colorScheme: theme, viewport });
       test('has no serious fault for those who do not see or point', async ({ panel, makeFile }) => {
-        test.setTimeout(120_000);
+        test.setTimeout(180_000);
         await still(panel.page);
         await walk(panel, makeFile);
       });

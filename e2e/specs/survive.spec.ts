@@ -105,7 +105,8 @@ async function goOn({ printer, panel }: Pick<Under, 'printer' | 'panel'>, gcode 
   expect(pulses(printer), 'nothing goes on by itself').toEqual(still);
   const began = performance.now();
   await dialog.getByRole('button', { name: 'Resume' }).click();
-  await expect.poll(() => pulses(printer)).not.toEqual(still);
+  // What has cooled is heated first.
+  await expect.poll(() => pulses(printer), { timeout: 60_000 }).not.toEqual(still);
   measured(`from Resume to the next step: ${((performance.now() - began) / 1000).toFixed(2)} s`);
   await expect(dialog).toHaveCount(0);
   await expect(panel.job).toContainText('The print is done.', { timeout: PRINT_TIMEOUT_MS });

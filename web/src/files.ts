@@ -59,3 +59,83 @@ export class FileChunks {
     await this.#reader.cancel().catch(() => undefined);
   }
 }
+
+/** Longer lines are cut: they are to be looked at. */
+const LINE_CHARACTERS_MAX = 120;
+/** Four bytes make a character at most. */
+const LINE_BYTES_MAX = 4 * LINE_CHARACTERS_MAX;
+const NEW_LINE = 10;
+
+/** Picks some lines out of bytes that come in pieces. */
+class LinePicker {
+  readonly texts: string[] = [];
+  readonly #first: number;
+  readonly #last: number;
+  #line = 1;
+  /** Of the line that is being read. */
+  #bytes: number[] = [];
+
+  constructor(first: number, last: number) {
+    this.#first = first;
+    this.#last = last;
+  }
+
+  get isDone(): boolean {
+    return this.#line > this.#last;
+  }
+
+  take(chunk: Uint8Array): void {
+    let at = 0;
+    while (at < chunk.byteLength && !this.isDone) {
+      const found = chunk.indexOf(NEW_LINE, at);
+      const end = found < 0 ? chunk.byteLength : found;
+      this.#keep(chunk.subarray(at, Math.min(end, at + LINE_BYTES_MAX)));
+      if (found < 0) return;
+      this.#end();
+      at = end + 1;
+    }
+  }
+
+  #keep(bytes: Uint8Array): void {
+    if (this.#line >= this.#first && this.#bytes.length < LINE_BYTES_MAX) this.#bytes.push(...bytes);
+  }
+
+  #end(): void {
+    if (this.#line >= this.#first) {
+      const text = new TextDecoder().decode(Uint8Array.from(this.#bytes)).trimEnd();
+      const isLong = text.length > LINE_CHARACTERS_MAX;
+      this.texts.push(isLong ? `${text.slice(0, LINE_CHARACTERS_MAX)}…` : text);
+    }
+    this.#bytes = [];
+    this.#line += 1;
+  }
+
+  /** The file has ended: a last line needs no end of its own. */
+  finish(): string[] {
+    if (this.#bytes.length > 0) this.#end();
+    return this.texts;
+  }
+}
+
+/**
+ * The lines `first` to `last` (both counted from 1 and included) as texts, without what ends them; fewer where the file
+ * ends before. Stops half-way, with nothing, once `isWanted` says no.
+ */
+export async function linesOf(
+  file: Blob,
+  first: number,
+  last: number,
+  isWanted: () => boolean = () => true,
+): Promise<string[]> {
+  const chunks = await FileChunks.open(file);
+  const picker = new LinePicker(first, last);
+  try {
+    for (let chunk = await chunks.next(); chunk && !picker.isDone; chunk = await chunks.next()) {
+      if (!isWanted()) return [];
+      picker.take(chunk);
+    }
+    return picker.finish();
+  } finally {
+    await chunks.cancel();
+  }
+}

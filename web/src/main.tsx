@@ -21,6 +21,8 @@ import { followPrint } from './state/print';
 import { loadProfiles } from './state/profiles';
 import { followPort } from './state/reconnect';
 import { applySettings } from './state/settings';
+import { followStart } from './state/start';
+import { followStartRequest } from './state/start_request';
 import { startWatching } from './state/watched';
 
 applySettings();
@@ -33,6 +35,8 @@ followTemperatures();
 guardPrint();
 followPort();
 followPrint();
+followStart();
+followStartRequest();
 followForNotifications();
 advisePinning();
 followHeld();

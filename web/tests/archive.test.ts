@@ -2,7 +2,7 @@
 // fails is said once and stops no print.
 import { beforeEach, expect, test } from 'vitest';
 import { type About, Archive, type PrintLog } from '../src/machine/archive';
-import type { Trouble } from '../src/machine/protocol';
+import { type Trouble, WHOLE } from '../src/machine/protocol';
 import type { JournalSummary } from '../src/machine/session';
 import { PrintStore } from '../src/machine/storage';
 import { seconds } from '../src/units';
@@ -14,6 +14,8 @@ const ABOUT: About = {
   machine: { name: 'Mill', config: '[printer]' },
   port: { vendor: 1, product: 2, index: 0 },
   fileBytes: 4,
+  start: WHOLE,
+  continues: null,
 };
 
 /** A journal of this test: numbers by spaces, the first the print's own; what follows a hash is torn off. */
@@ -26,7 +28,7 @@ function read(journal: Uint8Array, held: number | null): JournalSummary | null {
     number,
     hasEnded: numbers.includes(-1),
     isHeld: held !== null && numbers.includes(held),
-    line: numbers.length,
+    line: numbers.length > 1 ? numbers.length : 0,
     elapsed: seconds(1),
     readableBytes: text.length,
   };
@@ -71,9 +73,19 @@ test('a print that was interrupted is found again, with all there is to know of 
   await expect.poll(() => store.openFile(log.id).then((copy) => copy.text(), String)).toBe('G28\n');
   await interrupted(log);
   const [print] = await archive.list();
-  expect(print).toMatchObject({ ...ABOUT, id: log.id, line: 4 });
+  const { start, continues, ...known } = ABOUT;
+  expect(continues).toBeNull();
+  expect(print).toEqual({
+    ...known,
+    id: log.id,
+    line: 4,
+    startLine: start.line,
+    confirmedLines: start.confirmedLines,
+    elapsed: 1,
+    heardOf: expect.any(Number),
+  });
   const found = await archive.find(8);
-  expect(found?.print).toMatchObject(ABOUT);
+  expect(found?.print).toMatchObject(known);
   expect(await archive.find(9)).toBeNull();
   if (!found) throw new Error('not found');
   expect(await (await archive.openFile(found.print))?.text()).toBe('G28\n');
@@ -101,18 +113,30 @@ test('one tab at a time has a print', async () => {
   expect((await archive.reopen(found, tell)).id).toBe(log.id);
 });
 
-test('what has come to its end is not kept, what was only left is', async () => {
-  const [done, lost, left] = [await begun(), await begun(), await begun()];
+test('what has come to its end is not kept, what was left or lost in its middle is', async () => {
+  const [done, over, lost, idle, left] = [
+    await begun(),
+    await begun(),
+    await begun(),
+    await begun(),
+    await begun(),
+  ];
   done.append('5 6 -1');
-  lost.append('15 16');
-  left.append('25 26');
-  await archive.settle(done, false);
-  await archive.settle(lost, true);
-  await archive.settle(left, false);
-  expect((await archive.list()).map(({ id }) => id)).toEqual([left.id]);
-  expect((await store.listPrints()).map(({ id }) => id)).toEqual([left.id]);
+  over.append('15 16');
+  lost.append('25 26');
+  idle.append('35');
+  left.append('45 46');
+  await archive.settle(done, 'left');
+  await archive.settle(over, 'over');
+  await archive.settle(lost, 'lost');
+  await archive.settle(idle, 'lost');
+  await archive.settle(left, 'left');
+  const kept = [lost.id, left.id].sort();
+  expect((await archive.list()).map(({ id }) => id).sort()).toEqual(kept);
+  expect((await store.listPrints()).map(({ id }) => id).sort()).toEqual(kept);
   expect(locks.names.size).toBe(0);
   await archive.forget(left.id);
+  await archive.forget(lost.id);
   expect(await archive.list()).toEqual([]);
 });
 
@@ -121,10 +145,71 @@ test('a record that cannot be read for now is not thrown away for that', async (
   log.append('5 6');
   const { readJournal } = store;
   store.readJournal = () => Promise.reject(new DOMException('busy', 'UnknownError'));
-  await archive.settle(log, false);
+  await archive.settle(log, 'left');
   expect(await archive.list()).toEqual([]);
   store.readJournal = readJournal;
   expect((await archive.list()).map(({ id }) => id)).toEqual([log.id]);
+});
+
+/** A print in its middle, and another that goes on with it. */
+async function goneOnWith(journal: string): Promise<{ first: PrintLog; second: PrintLog }> {
+  const first = await begun();
+  archive.copy(first, file);
+  first.append('5 6');
+  await expect.poll(() => store.openFile(first.id).then((copy) => copy.text(), String)).toBe('G28\n');
+  await interrupted(first);
+  const start = { confirmedLines: [], line: 3 };
+  const second = await begun({ ...ABOUT, start, continues: first.id });
+  second.append(journal);
+  return { first, second };
+}
+
+test('the print that another goes on with is kept as long as its file is needed', async () => {
+  const { first, second } = await goneOnWith('15 16');
+  expect(await archive.list(), 'both are under way').toEqual([]);
+  await archive.forget(first.id);
+  await archive.settle(second, 'over');
+  expect(await store.listPrints()).toEqual([]);
+  expect(locks.names.size).toBe(0);
+});
+
+test('a print that was to go on with another and got nowhere leaves it as it was', async () => {
+  const { first, second } = await goneOnWith('15');
+  await interrupted(second);
+  expect((await archive.list()).map(({ id }) => id)).toEqual([first.id]);
+  await archive.settle(second, 'over');
+  expect((await archive.list()).map(({ id }) => id)).toEqual([first.id]);
+});
+
+test('what has got further takes the place of what it went on with, once it has the file itself', async () => {
+  const { first, second } = await goneOnWith('15 16');
+  await interrupted(second);
+  expect((await archive.list()).map(({ id, startLine }) => [id, startLine])).toEqual([[second.id, 3]]);
+  expect((await store.listPrints()).map(({ id }) => id)).toContain(first.id);
+  const found = await archive.find(16);
+  if (!found) throw new Error('not found');
+  const again = await archive.reopen(found, tell);
+  archive.copy(again, file);
+  await expect.poll(() => store.openFile(second.id).then((copy) => copy.text(), String)).toBe('G28\n');
+  await interrupted(again);
+  expect((await archive.list()).map(({ id }) => id)).toEqual([second.id]);
+  expect((await store.listPrints()).map(({ id }) => id)).toEqual([second.id]);
+});
+
+test('the file of a kept print: its copy, or the very same from the user', async () => {
+  const log = await begun();
+  log.append('5 6');
+  expect(await archive.fileOf(log.id, null)).toBeNull();
+  archive.copy(log, file);
+  await expect.poll(async () => (await archive.fileOf(log.id, null)) instanceof Blob).toBe(true);
+  const given = new Blob(['G28\n']);
+  expect(await archive.fileOf(log.id, given)).toBe(given);
+  for (const other of ['G29\n', 'G28\nG1'])
+    expect(await archive.fileOf(log.id, new Blob([other]))).toMatchObject({ code: 'other-file' });
+  expect(await archive.recordOf(log.id)).toMatchObject({ config: ABOUT.machine.config });
+  await interrupted(log);
+  await archive.forget(log.id);
+  expect(await archive.fileOf(log.id, null)).toMatchObject({ code: 'storage-missing' });
 });
 
 test('a record in which nothing was written, or whose print has ended, is put away with the list', async () => {

@@ -3,7 +3,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import { Connection, type Parts, TELL_MS } from '../src/machine/connection';
 import { LockstepLoop } from '../src/machine/lockstep';
 import { Machine } from '../src/machine/machine';
-import type { FromMachine } from '../src/machine/protocol';
+import { type FromMachine, WHOLE } from '../src/machine/protocol';
 import { portTrouble } from '../src/machine/troubles';
 import { NO_LINE_ERRORS, PortError } from '../src/transport/transport';
 import { seconds } from '../src/units';
@@ -131,7 +131,7 @@ test('a file that hangs while it is read does not hold up the end', async () => 
       { highWaterMark: 0 },
     );
   session.job = 'printing';
-  expect(await machine.print(file, [], () => seconds(0))).toBeNull();
+  expect(await machine.print(file, WHOLE, () => seconds(0))).toBeNull();
   const printer = new EchoPrinter();
   const loop = new LockstepLoop(machine, printer, 1, () => seconds(0));
   const { connection } = made({

@@ -1,7 +1,7 @@
 // A session that does what a test tells it, for the loops around it.
 
 import type { VirtualState } from '../src/bindings/VirtualState';
-import type { ConfirmedLines, JobStatus, MachineEvent, Phase, Trouble, Wish } from '../src/machine/protocol';
+import type { JobStatus, MachineEvent, Phase, PrintStart, Trouble, Wish } from '../src/machine/protocol';
 import type { Session, SessionSnapshot, SimulatedPrinter } from '../src/machine/session';
 import { celsius, type Seconds, seconds, share } from '../src/units';
 
@@ -13,6 +13,7 @@ const SNAPSHOT: SessionSnapshot = {
   position: null,
   homed: [false, false, false],
   job: 'none',
+  start: null,
   line: 0,
   elapsed: seconds(0),
   queued: null,
@@ -42,6 +43,7 @@ export class FakeSession implements Session {
   freed = false;
   /** What waits to be taken, and under which number. */
   journal: string[] = [];
+  readonly starts: PrintStart[] = [];
   journalNumber: number | null = null;
   held: number | null = null;
   readonly takenUp: string[] = [];
@@ -68,7 +70,8 @@ export class FakeSession implements Session {
     this.wishes.push(wish);
     return this.refusal;
   }
-  startJob(_confirmed: ConfirmedLines, journal: number | null): Trouble | null {
+  startJob(start: PrintStart, journal: number | null): Trouble | null {
+    this.starts.push(start);
     this.journalNumber = journal;
     return this.refusal;
   }

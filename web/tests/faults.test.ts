@@ -12,6 +12,7 @@ test.each([
   'unplug@5.5s, replug@6',
   'endstop-stuck-off=x',
   'heater-dead=extruder@.5,delay=0',
+  'board-reset@7, outage=1.5@8, power-loss=60@90',
 ])('%j can be used', (script) => expect(faultProblem(script)).toBeNull());
 
 test.each([
@@ -26,5 +27,8 @@ test.each([
   ['unplug=usb@1', 'takes no part'],
   ['unplug@-3', 'seconds'],
   ['meteor@3', 'not known'],
+  ['power-loss@3', 'seconds that it lasts'],
+  ['outage=long@3', 'seconds that it lasts'],
+  ['board-reset=1@3', 'takes no part'],
   ['unplug@3,', 'comma'],
 ])('%j is refused: %s', (script, says) => expect(faultProblem(script)).toContain(says));

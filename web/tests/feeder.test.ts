@@ -4,7 +4,7 @@ import { expect, test } from 'vitest';
 import { CHUNK_BYTES_MAX } from '../src/files';
 import { Feeder } from '../src/machine/feeder';
 import { Machine } from '../src/machine/machine';
-import type { FromMachine } from '../src/machine/protocol';
+import { type FromMachine, WHOLE } from '../src/machine/protocol';
 import { NO_LINE_ERRORS } from '../src/transport/transport';
 import { seconds } from '../src/units';
 import { FakeSession } from './fake_session';
@@ -72,7 +72,7 @@ test('a file that cannot be read is not begun', async () => {
     () => undefined,
     () => NO_LINE_ERRORS,
   );
-  const trouble = await machine.print(broken(1000), [], () => seconds(0));
+  const trouble = await machine.print(broken(1000), WHOLE, () => seconds(0));
   expect(trouble?.code).toBe('file-unreadable');
 });
 
@@ -94,7 +94,7 @@ async function brokenOff(): Promise<{ session: FakeSession; machine: Machine; to
         else controller.error(new DOMException('gone', 'NotReadableError'));
       },
     });
-  expect(await machine.print(file, [], () => seconds(0))).toBeNull();
+  expect(await machine.print(file, WHOLE, () => seconds(0))).toBeNull();
   session.job = 'printing';
   isThere = false;
   for (let round = 0; round < 50 && session.wishes.length === 0; round += 1) {
@@ -132,6 +132,6 @@ test('a print whose file broke off can be cancelled, not resumed', async () => {
   machine.poll(seconds(104));
   // The next print has nothing to do with it.
   session.job = 'printing';
-  expect(await machine.print(new Blob([content]), [], () => seconds(105))).toBeNull();
+  expect(await machine.print(new Blob([content]), WHOLE, () => seconds(105))).toBeNull();
   expect(machine.wish({ kind: 'resume' }, seconds(106))).toBeNull();
 });

@@ -43,7 +43,9 @@ const print = (config: string, line = 7): KeptPrint => ({
   machine: { name: 'Mill', config },
   port: PORT,
   line,
+  startLine: null,
   elapsed: seconds(9),
+  confirmedLines: [],
   heardOf: 0,
   fileBytes: 12,
 });
@@ -76,6 +78,12 @@ test('while a printer is connected nothing is offered; a board that holds nothin
   worker().say({ kind: 'held-print', held: null });
   worker().say({ kind: 'snapshot', snapshot: NOW });
   expect(shown().map(({ text }) => text)).toEqual([expect.stringContaining('does not hold it any more')]);
+  expect(shown()[0]?.action?.text).toBe('Continue from a line…');
+  // Nothing is offered beside a print that runs.
+  worker().say({ kind: 'snapshot', snapshot: { ...NOW, job: 'printing' } });
+  expect(shown()).toEqual([]);
+  worker().say({ kind: 'snapshot', snapshot: NOW });
+  expect(shown()).toHaveLength(1);
   worker().say({ kind: 'closed', trouble: null });
   expect(shown()).toHaveLength(2);
 });

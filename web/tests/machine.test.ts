@@ -1,7 +1,7 @@
 // What a connection tells the page, and when.
 import { expect, test, vi } from 'vitest';
 import { Machine } from '../src/machine/machine';
-import type { FromMachine } from '../src/machine/protocol';
+import { type FromMachine, WHOLE } from '../src/machine/protocol';
 import { fileUnreadable } from '../src/machine/troubles';
 import { NO_LINE_ERRORS } from '../src/transport/transport';
 import { seconds } from '../src/units';
@@ -64,7 +64,7 @@ test('after the connection has failed no emergency stop is promised', () => {
 test('the file of a job that ended in an error is let go of', async () => {
   const { machine: made, session } = machine();
   session.job = 'printing';
-  expect(await made.print(new Blob(['G28\n']), [], () => seconds(0))).toBeNull();
+  expect(await made.print(new Blob(['G28\n']), WHOLE, () => seconds(0))).toBeNull();
   made.tell(seconds(1));
   session.wants = 1;
   made.poll(seconds(1));
@@ -81,7 +81,7 @@ test('what the session threw when a print was to begin is not taken for the file
   vi.spyOn(session, 'startJob').mockImplementation(() => {
     throw new Error('unreachable');
   });
-  await expect(made.print(new Blob(['G28\n']), [], () => seconds(0))).rejects.toThrow('unreachable');
+  await expect(made.print(new Blob(['G28\n']), WHOLE, () => seconds(0))).rejects.toThrow('unreachable');
 });
 
 test('wake-ups that come late are counted, and told from a second on', () => {

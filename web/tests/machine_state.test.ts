@@ -1,6 +1,12 @@
 // What the page makes of what the machine worker says, and of a worker that says nothing more.
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
-import type { FromMachine, PortChoice, Snapshot, ToMachine } from '../src/machine/protocol';
+import {
+  type FromMachine,
+  type PortChoice,
+  type Snapshot,
+  type ToMachine,
+  WHOLE,
+} from '../src/machine/protocol';
 import { portTrouble, stopNotSent } from '../src/machine/troubles';
 import { seconds } from '../src/units';
 import { FakeSession } from './fake_session';
@@ -169,7 +175,7 @@ test('a print that ends in an error has stopped, though the board is ready', () 
 
 test('a print that ends in an error before the first snapshot has stopped, too', async () => {
   const worker = connected();
-  const begun = page.print(new Blob(), FACTS, []);
+  const begun = page.print(new Blob(), FACTS, WHOLE);
   const asked = worker.sent.find((message) => message.kind === 'print');
   if (asked?.kind !== 'print') throw new Error('no print was asked for');
   worker.say({ kind: 'answer', id: asked.id, trouble: null });

@@ -8,6 +8,7 @@ import { mm, seconds, share } from '../src/units';
 const layers: Layer[] = [0, 100, 250].map((first, at) => ({
   first,
   z: mm(0.2 * (at + 1)),
+  line: first + 10,
   time: seconds(10),
 }));
 const plan: Summary = {
@@ -67,7 +68,7 @@ test.each([
 test('a file without layers has none', () => expect(layerOf([], 5)).toBe(0));
 
 test('progress goes by the plan’s time, and what is left by the speed that is set', () => {
-  const job = { file, summary: plan, marks: marksOf([10, 20], [200, 120]) };
+  const job = { file, summary: plan, marks: marksOf([10, 20], [200, 120]), from: null };
   expect(progressOf(job, now(210, 50, 2, 350), 100)).toEqual({
     share: 0.25,
     elapsed: 50,
@@ -82,12 +83,12 @@ test('progress goes by the plan’s time, and what is left by the speed that is 
 });
 
 test('where the plan has no time, lines count and nothing is said of what is left', () => {
-  const job = { file, summary: { ...plan, time: null }, marks: marksOf() };
+  const job = { file, summary: { ...plan, time: null }, marks: marksOf(), from: null };
   expect(progressOf(job, now(100, 50))).toMatchObject({ share: 0.25, left: null });
 });
 
 test('filament is not known where the position is not', () => {
-  const job = { file, summary: plan, marks: marksOf() };
+  const job = { file, summary: plan, marks: marksOf(), from: null };
   expect(progressOf(job, { ...now(1, 1), position: null }).filament).toBeNull();
 });
 

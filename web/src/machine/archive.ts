@@ -3,10 +3,11 @@
 //
 // Knows no port and no session; what a journal says, the planner reads.
 import type { PortId } from '../transport/web_serial';
-import type { KeptPrint, PrintFacts, Trouble } from './protocol';
+import type { Ending } from './machine';
+import { type KeptPrint, type PrintFacts, type PrintStart, type Trouble, WHOLE } from './protocol';
 import type { JournalSummary } from './session';
 import { type OpenPrint, type PrintStore, StorageError } from './storage';
-import { copyMissing, storageTrouble } from './troubles';
+import { copyMissing, otherFile, storageTrouble } from './troubles';
 
 /** Numbers from a print's own on belong to it. */
 const NUMBERS_PER_PRINT = 2 ** 20;
@@ -18,6 +19,9 @@ export interface About {
   readonly machine: { readonly name: string; readonly config: string };
   readonly port: PortId;
   readonly fileBytes: number;
+  readonly start: PrintStart;
+  /** The interrupted print that it goes on with. */
+  readonly continues: string | null;
 }
 
 /** Who has which print open, among all tabs. */
@@ -56,9 +60,13 @@ export interface Found {
   readonly readableBytes: number;
 }
 
+interface Listed {
+  readonly print: KeptPrint;
+  readonly continues: string | null;
+}
+
 const encoder = new TextEncoder();
-/** One print that cannot be read does not hide the others. */
-const nothing = (): [] => [];
+const NONE: Pick<About, 'start' | 'continues'> = { start: WHOLE, continues: null };
 
 /** Whatever was thrown: what cannot be kept must not stop a print. */
 const asStorageError = (error: unknown): StorageError =>
@@ -74,12 +82,16 @@ export function troubleOf(error: unknown): Trouble {
 interface Opened {
   readonly open: OpenPrint;
   readonly letGo: () => void;
+  /** Of the print that it goes on with: its copy of the file may be what is printed. */
+  readonly letGoOther: (() => void) | null;
 }
 
 /** The journal of the print that runs, and the copy of its file. Never throws. */
 export class PrintLog {
   readonly id: string;
   readonly number: number;
+  /** The interrupted print that it goes on with. */
+  readonly continues: string | null;
   readonly #open: OpenPrint;
   readonly #letGo: () => void;
   readonly #tell: Tell;
@@ -87,11 +99,21 @@ export class PrintLog {
   #copying: Promise<void> = Promise.resolve();
   readonly #closing = new AbortController();
 
-  constructor(id: string, number: number, { open, letGo }: Opened, tell: Tell) {
+  constructor(
+    id: string,
+    number: number,
+    { open, letGo, letGoOther }: Opened,
+    tell: Tell,
+    continues: string | null,
+  ) {
     this.id = id;
     this.number = number;
+    this.continues = continues;
     this.#open = open;
-    this.#letGo = letGo;
+    this.#letGo = () => {
+      letGo();
+      letGoOther?.();
+    };
     this.#tell = tell;
   }
 
@@ -159,24 +181,27 @@ export class Archive {
     let opened: Opened | undefined;
     try {
       const number = await this.#number();
-      opened = await this.#open(id);
+      opened = await this.#open(id, about.continues);
       await opened.open.describe(encoder.encode(JSON.stringify(about)));
-      return new PrintLog(id, number, opened, tell);
+      return new PrintLog(id, number, opened, tell, about.continues);
     } catch (error) {
       opened?.open.close();
       opened?.letGo();
+      opened?.letGoOther?.();
       tell(troubleOf(error));
       return null;
     }
   }
 
-  async #open(id: string): Promise<Opened> {
+  async #open(id: string, continues: string | null): Promise<Opened> {
     const letGo = await this.#locks.hold(id);
     if (!letGo) throw new StorageError('in-use');
+    const letGoOther = continues === null ? null : await this.#locks.hold(continues);
     try {
-      return { open: await this.#store.openPrint(id), letGo };
+      return { open: await this.#store.openPrint(id), letGo, letGoOther };
     } catch (error) {
       letGo();
+      letGoOther?.();
       throw error;
     }
   }
@@ -207,40 +232,63 @@ export class Archive {
     log.copy(file, this.#store.hasRoomFor(file.size));
   }
 
-  /** A print is over for this page: what has come to its end is not kept. `isLost`: the board has nothing of it any more. */
-  async settle(log: PrintLog, isLost: boolean): Promise<void> {
+  /** A print is over for this page: what has come to its end is not kept, and neither is what has not got anywhere. */
+  async settle(log: PrintLog, ending: Ending): Promise<void> {
     await log.close();
-    if (isLost || (await this.#summary(log.id))?.hasEnded) await this.forget(log.id);
+    const summary = await this.#summary(log.id);
+    const hasBegun = summary !== null && summary.line > 0;
+    if (ending !== 'over' && !summary?.hasEnded && (ending === 'left' || hasBegun)) return;
+    await this.forget(log.id);
+    // What it went on with can be gone on with again where nothing came of it.
+    if (log.continues !== null && hasBegun) await this.forget(log.continues);
   }
 
   /** Prints that were interrupted, the newest first. Those that have ended are put away. Empty where nothing can be read. */
   async list(): Promise<readonly KeptPrint[]> {
-    const found: KeptPrint[] = [];
+    const found: Listed[] = [];
+    /** Prints that were gone on with, and got further by that. */
+    const overtaken = new Set<string>();
     try {
       const prints = await this.#store.listPrints();
       // Asked after that: whoever begins a print has its lock first.
       const busy = await this.#locks.held();
-      for (const { id, changed, journalBytes } of prints) {
+      for (const { id, changed, journalBytes, fileBytes } of prints) {
         if (busy.has(id)) continue;
         const summary = await this.#summary(id);
         if (journalBytes === 0 || summary?.hasEnded) await this.forget(id);
-        else if (summary)
-          found.push(...(await this.#kept(id, summary, changed).then((one) => [one], nothing)));
+        else if (summary) {
+          // One that cannot be read does not hide the others.
+          const one = await this.#listed(id, summary, changed).catch(() => null);
+          if (!one) continue;
+          found.push(one);
+          if (one.continues === null || summary.line === 0) continue;
+          overtaken.add(one.continues);
+          if (fileBytes !== null && !busy.has(one.continues)) await this.forget(one.continues);
+        }
       }
     } catch {
       // Where nothing can be read nothing is offered; a print that begins says so.
     }
-    return found;
+    const left = found.filter(({ print }) => !overtaken.has(print.id));
+    // One that never got anywhere says less than the one that it was to go on with.
+    const isIdle = ({ print, continues }: Listed): boolean =>
+      print.line === 0 && left.some((other) => other.print.id === continues);
+    return left.filter((one) => !isIdle(one)).map(({ print }) => print);
   }
 
-  async #kept(id: string, { line, elapsed }: JournalSummary, changed: Date): Promise<KeptPrint> {
-    const { facts, machine, port, fileBytes } = await this.#about(id);
-    return { id, facts, machine, port, fileBytes, line, elapsed, heardOf: changed.getTime() };
+  async #listed(id: string, { line, elapsed }: JournalSummary, changed: Date): Promise<Listed> {
+    const { facts, machine, port, fileBytes, start, continues } = await this.#about(id);
+    const { line: startLine, confirmedLines } = start;
+    const heardOf = changed.getTime();
+    const print = { id, facts, machine, port, fileBytes, line, startLine, elapsed, confirmedLines, heardOf };
+    return { print, continues };
   }
 
   async #about(id: string): Promise<About> {
     // Written by this page's own code; one that was torn off cannot be parsed.
-    return JSON.parse(new TextDecoder().decode(await this.#store.readAbout(id))) as About;
+    const about = JSON.parse(new TextDecoder().decode(await this.#store.readAbout(id))) as About;
+    // One that an earlier version of the page wrote does not say how it was begun.
+    return { ...NONE, ...about };
   }
 
   /** The print whose journal knows the number under which the board holds one. Rejects where nothing can be read. */
@@ -250,7 +298,8 @@ export class Archive {
       const summary = journal && this.#read(journal, held);
       if (!journal || !summary?.isHeld) continue;
       const { number, readableBytes } = summary;
-      return { print: await this.#kept(id, summary, changed), number, journal, readableBytes };
+      const { print } = await this.#listed(id, summary, changed);
+      return { print, number, journal, readableBytes };
     }
     return null;
   }
@@ -264,6 +313,24 @@ export class Archive {
     }
   }
 
+  /** The file of a print that is kept: its copy, null without one, or the one that the user has given, where that is it. */
+  async fileOf(id: string, given: Blob | null): Promise<Blob | Trouble | null> {
+    try {
+      const { facts, fileBytes } = await this.#about(id);
+      if (given === null) return await this.#store.openFile(id).catch(() => null);
+      const isIts = given.size === fileBytes && (await this.#store.isItsFile(id, given));
+      return isIts ? given : otherFile(facts.name);
+    } catch (error) {
+      return troubleOf(error);
+    }
+  }
+
+  /** The journal of a print, and the machine's file as it was then. Rejects where they cannot be read. */
+  async recordOf(id: string): Promise<{ readonly journal: Uint8Array; readonly config: string }> {
+    const { machine } = await this.#about(id);
+    return { journal: await this.#store.readJournal(id), config: machine.config };
+  }
+
   /** Whether a file from the user can be the print's. Rejects where nothing can be read. */
   async isItsFile({ id, fileBytes }: KeptPrint, file: Blob): Promise<boolean> {
     return file.size === fileBytes && (await this.#store.isItsFile(id, file));
@@ -271,9 +338,10 @@ export class Archive {
 
   /** Opens a record again, to be added to. Rejects where another tab has it. */
   async reopen({ print, number, readableBytes }: Found, tell: Tell): Promise<PrintLog> {
-    const opened = await this.#open(print.id);
+    const { continues } = await this.#about(print.id);
+    const opened = await this.#open(print.id, continues);
     opened.open.keepJournal(readableBytes);
-    return new PrintLog(print.id, number, opened, tell);
+    return new PrintLog(print.id, number, opened, tell, continues);
   }
 
   async forget(id: string): Promise<void> {

@@ -60,8 +60,9 @@ export class Continuation {
     } else if (held !== null) {
       const found = this.#found;
       this.#end();
-      // Restarted at the user's word: nothing of the print is left on the board.
-      if (phase === 'identifying' && found) this.#next(() => this.#of.archive.forget(found.print.id));
+      // Restarted at the user's word: of a print that had got nowhere nothing is left.
+      if (phase === 'identifying' && found?.print.line === 0)
+        this.#next(() => this.#of.archive.forget(found.print.id));
     }
   }
 

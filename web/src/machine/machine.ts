@@ -7,10 +7,10 @@ import { type Seconds, seconds } from '../units';
 import type { PrintLog } from './archive';
 import { Feeder } from './feeder';
 import type {
-  ConfirmedLines,
   FromMachine,
   MachineEvent,
   Phase,
+  PrintStart,
   Snapshot,
   Trouble,
   WakeUps,
@@ -33,13 +33,15 @@ const PIECES_MAX = 16;
 /** … and then again after this time. */
 const PIECES_EVERY = seconds(0.004);
 
+/** How a print ended for this page: by itself or at the user's word; with a board that has forgotten it; or it may go on. */
+export type Ending = 'over' | 'lost' | 'left';
+
 /** Who keeps prints, and follows what happens to them. */
 export interface Keeping {
   onEvent(event: MachineEvent): void;
   /** The page is told how things are now. */
   onTell(): void;
-  /** The print is over for this page; `isLost` where the board has nothing of it any more. */
-  settle(log: PrintLog, isLost: boolean): Promise<void>;
+  settle(log: PrintLog, ending: Ending): Promise<void>;
 }
 
 export class Machine {
@@ -149,7 +151,7 @@ export class Machine {
   #collect(): void {
     this.#keepJournal();
     for (const event of this.session.takeEvents()) {
-      if (event.kind === 'done' || event.kind === 'cancelled') this.#jobOver(true);
+      if (event.kind === 'done' || event.kind === 'cancelled') this.#jobOver('over');
       else if (event.kind === 'phase') this.#onPhase(event.phase);
       this.#push(event);
     }
@@ -158,15 +160,15 @@ export class Machine {
   #onPhase(phase: Phase): void {
     if (phase === 'ready') this.#isTakingUp = false;
     // A board that has stopped has forgotten its moves; one that is out of reach may hold them.
-    else if (phase !== 'holding') this.#jobOver(phase === 'shutdown');
+    else if (phase !== 'holding') this.#jobOver(phase === 'shutdown' ? 'lost' : 'left');
   }
 
-  #jobOver(isLost: boolean): void {
+  #jobOver(ending: Ending): void {
     this.#isTakingUp = false;
     this.dropJob();
     const log = this.#log;
     this.#log = null;
-    if (log) this.#logClosed = this.#keeping?.settle(log, isLost) ?? log.close();
+    if (log) this.#logClosed = this.#keeping?.settle(log, ending) ?? log.close();
   }
 
   /** Settles once the record of the last print is closed. */
@@ -190,7 +192,7 @@ export class Machine {
     this.#events = [];
     const snapshot = this.look(now);
     // A job that ended in an error has no event of its own.
-    if (snapshot.job === 'none' && !this.#isTakingUp) this.#jobOver(false);
+    if (snapshot.job === 'none' && !this.#isTakingUp) this.#jobOver('left');
     this.#keeping?.onTell();
     this.#tell({ kind: 'snapshot', snapshot });
     if (!this.watchesSpeed) return;
@@ -224,7 +226,7 @@ export class Machine {
   /** Starts a print. `now` is asked for once the file is open, and so is a record of the print, where one is kept. */
   async print(
     file: Blob,
-    confirmedLines: ConfirmedLines,
+    start: PrintStart,
     now: () => Seconds,
     openLog: () => Promise<PrintLog | null> = async () => null,
   ): Promise<Trouble | null> {
@@ -234,10 +236,10 @@ export class Machine {
       const feeder = await Feeder.open(file, this.session).catch((error: unknown) => fileUnreadable(error));
       if (!(feeder instanceof Feeder)) return feeder;
       const log = feeder.failure === undefined ? await openLog() : null;
-      const trouble = this.#begin(feeder, log, confirmedLines, now);
+      const trouble = this.#begin(feeder, log, start, now);
       if (trouble || this.#freed) {
         await feeder.close();
-        if (log) await this.#keeping?.settle(log, true);
+        if (log) await this.#keeping?.settle(log, 'over');
       }
       return trouble;
     } finally {
@@ -245,15 +247,10 @@ export class Machine {
     }
   }
 
-  #begin(
-    feeder: Feeder,
-    log: PrintLog | null,
-    confirmedLines: ConfirmedLines,
-    now: () => Seconds,
-  ): Trouble | null {
+  #begin(feeder: Feeder, log: PrintLog | null, start: PrintStart, now: () => Seconds): Trouble | null {
     if (this.#freed) return null;
     if (feeder.failure !== undefined) return fileUnreadable(feeder.failure);
-    const trouble = this.session.startJob(confirmedLines, log?.number ?? null, now());
+    const trouble = this.session.startJob(start, log?.number ?? null, now());
     if (trouble) return trouble;
     this.dropJob();
     this.#feeder = feeder;
@@ -287,7 +284,7 @@ export class Machine {
 
   /** Gives up making a plan again; what is said where its file could not be read. */
   dropTakeUp(reason?: unknown): Trouble {
-    if (this.#isTakingUp) this.#jobOver(false);
+    if (this.#isTakingUp) this.#jobOver('left');
     return fileUnreadable(reason);
   }
 
@@ -298,7 +295,7 @@ export class Machine {
 
   free(): void {
     this.#freed = true;
-    this.#jobOver(false);
+    this.#jobOver('left');
     this.session.free();
   }
 }

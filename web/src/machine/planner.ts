@@ -1,17 +1,23 @@
 // The planner's session and virtual printer for the machine worker: the generated WebAssembly behind the page's types.
 // The one place that knows the planner's messages about machines.
+import type { InterruptionView } from '../bindings/InterruptionView';
 import type { JobRequest } from '../bindings/JobRequest';
 import type { JournalView } from '../bindings/JournalView';
 import type { Snapshot as PlannerSnapshot } from '../bindings/Snapshot';
 import type { UiEvent } from '../bindings/UiEvent';
 import type { UiRequest } from '../bindings/UiRequest';
 import type { VirtualState } from '../bindings/VirtualState';
-import initialise, { PrinterSession, read_journal, VirtualPrinter } from '../bindings/wasm/planner_wasm.js';
+import initialise, {
+  Survey as PlannerSurvey,
+  PrinterSession,
+  read_journal,
+  VirtualPrinter,
+} from '../bindings/wasm/planner_wasm.js';
 import { inWords, plannerTrouble } from '../planner_error';
 import { NO_LINE_ERRORS } from '../transport/transport';
-import { celsius, mm, type Seconds, seconds, share } from '../units';
-import type { Axis, ConfirmedLines, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
-import type { JournalSummary, Session, SessionSnapshot, SimulatedPrinter } from './session';
+import { celsius, type Mm, mm, type Seconds, seconds, share } from '../units';
+import type { Axis, Interruption, MachineEvent, PrintStart, Snapshot, Trouble, Wish } from './protocol';
+import type { JournalSummary, Session, SessionSnapshot, SimulatedPrinter, Survey } from './session';
 
 /** Speeds of moves by hand, mm/s; the machine's own limits hold besides. */
 const JOG_SPEED: Record<Axis, number> = { X: 100, Y: 100, Z: 10 };
@@ -27,6 +33,8 @@ export interface Planner {
   powerUp(config: string, board: string, seed: number, faults: string): SimulatedPrinter;
   /** Null where it cannot be read. `held` is what a session's `heldPrint` gave. */
   readJournal(journal: Uint8Array, held: number | null): JournalSummary | null;
+  /** Of a print's journal and the machine's file as it was then. Throws, as it does later, what `asTrouble` understands. */
+  survey(config: string, journal: Uint8Array): Survey;
   /** The planner's error, or null where something else was thrown. */
   asTrouble(error: unknown): Trouble | null;
 }
@@ -42,9 +50,25 @@ export async function loadPlanner(): Promise<Planner> {
       const text = read_journal(journal, held ?? undefined);
       return text === undefined ? null : fromJournal(JSON.parse(text) as JournalView);
     },
+    survey: (config, journal) => new WasmSurvey(new PlannerSurvey(config, journal)),
     asTrouble: plannerTrouble,
   };
 }
+
+const fromInterruption = (view: InterruptionView): Interruption => ({
+  line: view.line,
+  startLine: view.start_line,
+  reachLine: view.reach_line,
+  layer: view.layer,
+  layerZ: mm(view.layer_z_mm),
+  layerLine: view.layer_line,
+  zRange: view.z_range_mm && [mm(view.z_range_mm[0]), mm(view.z_range_mm[1])],
+  zPlaces: view.z_places_mm.map(mm),
+  zPitch: mm(view.z_pitch_mm),
+  zError: mm(view.z_error_mm),
+  speedFactor: share(view.speed_factor),
+  flowFactor: share(view.flow_factor),
+});
 
 const fromJournal = (view: JournalView): JournalSummary => ({
   number: view.print,
@@ -80,6 +104,8 @@ function toRequest(wish: Wish): UiRequest {
         distance_mm: wish.distance,
         speed_mm_s: JOG_SPEED[wish.axis],
       };
+    case 'set-position':
+      return { type: 'set-position', axis: lower(wish.axis), position_mm: wish.position };
     case 'extrude':
       return { type: 'extrude', length_mm: wish.length, speed_mm_s: wish.speed };
     case 'temperature':
@@ -135,6 +161,8 @@ function fromEvent(event: UiEvent): MachineEvent | null {
 type Place = readonly [number, number, number, number];
 const place = ([x, y, z, e]: Place): NonNullable<Snapshot['position']> => [mm(x), mm(y), mm(z), mm(e)];
 
+const point = ([x, y, z]: readonly [number, number, number]): readonly [Mm, Mm, Mm] => [mm(x), mm(y), mm(z)];
+
 function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
   const position = now.live_mm ?? now.position_mm;
   const { link } = now;
@@ -150,6 +178,11 @@ function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
     position: position && place(position),
     homed: now.homed,
     job: now.job.status,
+    start: now.job.start && {
+      line: now.job.start.line,
+      position: point(now.job.start.position_mm),
+      clearZ: mm(now.job.start.clear_z_mm),
+    },
     line: now.job.line,
     elapsed: seconds(now.job.elapsed_s),
     queued: now.queued_s === null ? null : seconds(now.queued_s),
@@ -198,13 +231,13 @@ class WasmSession implements Session {
     return refusal(() => this.#inner.request(JSON.stringify(toRequest(wish)), now));
   }
 
-  startJob(confirmedLines: ConfirmedLines, journal: number | null, now: Seconds): Trouble | null {
+  startJob({ confirmedLines, line }: PrintStart, journal: number | null, now: Seconds): Trouble | null {
     const isAll = confirmedLines === 'all';
     const request: JobRequest = {
       confirmed_lines: isAll ? [] : [...confirmedLines],
       confirm_all: isAll,
       journal,
-      start_line: null,
+      start_line: line,
     };
     return refusal(() => this.#inner.start_job(JSON.stringify(request), now));
   }
@@ -239,6 +272,41 @@ class WasmSession implements Session {
 
   snapshot(now: Seconds): SessionSnapshot {
     return fromSnapshot(JSON.parse(this.#inner.snapshot(now)) as PlannerSnapshot);
+  }
+
+  free(): void {
+    this.#inner.free();
+  }
+}
+
+class WasmSurvey implements Survey {
+  readonly #inner: PlannerSurvey;
+
+  constructor(inner: PlannerSurvey) {
+    this.#inner = inner;
+  }
+
+  wants(): number {
+    return this.#inner.wants();
+  }
+
+  feed(bytes: Uint8Array): void {
+    this.#inner.feed(bytes);
+    this.#advance();
+  }
+
+  end(): void {
+    this.#inner.finish();
+    this.#advance();
+  }
+
+  #advance(): void {
+    while (this.#inner.advance());
+  }
+
+  report(): Interruption | null {
+    const text = this.#inner.report();
+    return text === undefined ? null : fromInterruption(JSON.parse(text) as InterruptionView);
   }
 
   free(): void {

@@ -51,6 +51,15 @@ export interface LinkCounts {
   readonly lineErrors: LineErrors;
 }
 
+/** A print that begins in the middle of its file, as the board's owner has it. */
+export interface StartAt {
+  readonly line: number;
+  /** Where the lines before have the head. */
+  readonly position: readonly [Mm, Mm, Mm];
+  /** The height over which the way there leads. */
+  readonly clearZ: Mm;
+}
+
 /** How late the worker's timers were since the connection began. */
 export interface WakeUps {
   /** So many by more than a second: the computer slept, or was very busy. */
@@ -66,6 +75,8 @@ export interface Snapshot {
   readonly position: readonly [Mm, Mm, Mm, Mm] | null;
   readonly homed: readonly [boolean, boolean, boolean];
   readonly job: JobStatus;
+  /** The print is paused before its first line, which is in the middle of its file. */
+  readonly start: StartAt | null;
   /** The line of the last move that has been made. */
   readonly line: number;
   /** Print time made so far. */
@@ -96,6 +107,8 @@ export type Wish =
   | { readonly kind: 'gcode'; readonly text: string }
   | { readonly kind: 'home'; readonly axes: readonly Axis[] }
   | { readonly kind: 'jog'; readonly axis: Axis; readonly distance: Mm }
+  /** The user's word for where an axis stands. */
+  | { readonly kind: 'set-position'; readonly axis: Axis; readonly position: Mm }
   /** `speed` in mm/s of filament. */
   | { readonly kind: 'extrude'; readonly length: Mm; readonly speed: number }
   | { readonly kind: 'temperature'; readonly heater: HeaterName; readonly target: Celsius }
@@ -129,8 +142,12 @@ export interface KeptPrint {
   readonly port: PortId;
   /** The line of the last move that was seen to be made; 0 where none was. */
   readonly line: number;
-  /** Print time then. */
+  /** The line with which it was begun, where that was not the first. */
+  readonly startLine: number | null;
+  /** Print time made. */
   readonly elapsed: Seconds;
+  /** What the user had left out. */
+  readonly confirmedLines: ConfirmedLines;
   /** When it was last heard of, in ms since 1970. */
   readonly heardOf: number;
   /** The size of its file. */
@@ -153,6 +170,53 @@ export type HeldPrint =
 /** Lines that the user wants left out; all that are not known, where there are more than can be listed. */
 export type ConfirmedLines = readonly number[] | 'all';
 
+/** How a print is begun. */
+export interface PrintStart {
+  readonly confirmedLines: ConfirmedLines;
+  /** The line with which it begins, as if those before had been made; null is the first. Then it is paused. */
+  readonly line: number | null;
+}
+
+/** From the first line, with nothing left out. */
+export const WHOLE: PrintStart = { confirmedLines: [], line: null };
+
+/** Where an interrupted print was, as far as its journal and its file tell. */
+export interface Interruption {
+  /** The line of the last move that is known to have been made. */
+  readonly line: number;
+  /** The line to go on with: nothing is left out. */
+  readonly startLine: number;
+  /** It got no further than this line. */
+  readonly reachLine: number;
+  /** Counted from 1. */
+  readonly layer: number;
+  readonly layerZ: Mm;
+  /** The line with which that layer begins. */
+  readonly layerLine: number;
+  /** Where Z was when it was interrupted; null where it was being homed, or moved by hand. */
+  readonly zRange: readonly [Mm, Mm] | null;
+  /** Where Z can stand once its motor has current again, the likeliest first; empty where nothing can be said. */
+  readonly zPlaces: readonly Mm[];
+  /** So far are such places apart. */
+  readonly zPitch: Mm;
+  /** What is in doubt at the right place; where there is none, how far from `zRange` it may stand. */
+  readonly zError: Mm;
+  readonly speedFactor: Share;
+  readonly flowFactor: Share;
+}
+
+/** What there is of a kept print's file. */
+export type KeptFile =
+  /** `at` is null where its place cannot be found, which `trouble` says why. */
+  | {
+      readonly kind: 'there';
+      readonly file: Blob;
+      readonly at: Interruption | null;
+      readonly trouble: Trouble | null;
+    }
+  /** There is no whole copy of it; `trouble`: the one that was given is not it, or nothing can be read. */
+  | { readonly kind: 'missing'; readonly trouble: Trouble | null };
+
 export type ToMachine =
   | {
       readonly kind: 'connect';
@@ -169,9 +233,13 @@ export type ToMachine =
       readonly kind: 'print';
       readonly id: number;
       readonly file: Blob;
-      readonly confirmedLines: ConfirmedLines;
+      readonly start: PrintStart;
       readonly facts: PrintFacts;
+      /** The interrupted print that it goes on with; null where it is one of its own. */
+      readonly continues: string | null;
     }
+  /** Asks for the file of a kept print, and where in it the print was; where the user has `given` one, whether it is that. */
+  | { readonly kind: 'kept-file'; readonly id: number; readonly print: string; readonly given: Blob | null }
   /** The file of the print that the board holds, from the user. */
   | { readonly kind: 'held-file'; readonly file: Blob }
   /** Nothing of this print is to be kept. */
@@ -211,6 +279,8 @@ export type FromMachine =
   | { readonly kind: 'not-kept'; readonly trouble: Trouble }
   /** Null once there is nothing more to be decided. */
   | { readonly kind: 'held-print'; readonly held: HeldPrint | null }
+  /** The answer to that question. */
+  | { readonly kind: 'kept-file'; readonly id: number; readonly found: KeptFile }
   /** What came of a wish or of a print's start. */
   | { readonly kind: 'answer'; readonly id: number; readonly trouble: Trouble | null }
   /** The worker's clock jumped: the computer slept, or the worker was held up. */

@@ -2,7 +2,7 @@
 // Knows no port and no clock: bytes and time are arguments.
 import type { VirtualState } from '../bindings/VirtualState';
 import type { Seconds } from '../units';
-import type { ConfirmedLines, MachineEvent, Snapshot, Trouble, Wish } from './protocol';
+import type { Interruption, MachineEvent, PrintStart, Snapshot, Trouble, Wish } from './protocol';
 
 /** What a session knows of a snapshot; the rest is its owner's. */
 export type SessionSnapshot = Omit<Snapshot, 'wakeUps'>;
@@ -31,7 +31,7 @@ export interface Session {
   /** Null where the wish is being carried out. */
   wish(wish: Wish, now: Seconds): Trouble | null;
   /** `journal` is the print's own number, with which a journal is kept. */
-  startJob(confirmedLines: ConfirmedLines, journal: number | null, now: Seconds): Trouble | null;
+  startJob(start: PrintStart, journal: number | null, now: Seconds): Trouble | null;
   /** What is to be added to the print's journal, and stored before the bytes of the last `poll` are sent. */
   takeJournal(): string;
   /** In the phase `holding`: the number that the board gives for the print it holds. */
@@ -45,6 +45,18 @@ export interface Session {
   snapshot(now: Seconds): SessionSnapshot;
   /** Pairs of time (s, relative to now) and the toolhead's planned speed (mm/s). */
   plannedSpeed(now: Seconds, behind: Seconds, ahead: Seconds): Float64Array<ArrayBuffer>;
+  free(): void;
+}
+
+/** Finds out where an interrupted print was. Moves nothing. */
+export interface Survey {
+  /** How many bytes of the print's file may be fed now; none once it is done. */
+  wants(): number;
+  feed(bytes: Uint8Array): void;
+  /** The file has ended. */
+  end(): void;
+  /** Null while it is not done. */
+  report(): Interruption | null;
   free(): void;
 }
 

@@ -10,10 +10,11 @@ import { Archive, type PrintLog } from './archive';
 import { Broadcast } from './broadcast';
 import { Connection, Died, type Parts } from './connection';
 import { Continuation } from './continuation';
+import { locate } from './locate';
 import { LockstepLoop } from './lockstep';
 import { type Keeping, Machine } from './machine';
 import { loadPlanner, type Planner } from './planner';
-import type { FromMachine, PortChoice, PrintFacts, Snapshot, ToMachine, Trouble, Wish } from './protocol';
+import type { FromMachine, KeptFile, PortChoice, Snapshot, ToMachine, Trouble, Wish } from './protocol';
 import { RealTimeLoop } from './realtime';
 import { PrintStore } from './storage';
 import { answerTrouble, plannerMissing, portInUse, portTrouble, stopNotSent } from './troubles';
@@ -25,6 +26,7 @@ const scope = self as unknown as { postMessage(message: FromMachine, transfer: T
 const realNow = (): Seconds => seconds(performance.now() / 1000);
 
 type Connect = ToMachine & { kind: 'connect' };
+type Print = ToMachine & { kind: 'print' };
 
 let planner: Planner | undefined;
 /** Prints on real printers; one on a virtual printer is gone with the page, and its printer with it. */
@@ -185,7 +187,7 @@ const tellNotKept = (trouble: Trouble): void => tell({ kind: 'not-kept', trouble
 const keepingIn = (prints: Archive): Keeping => ({
   onEvent: (event) => continuation?.note(event),
   onTell: () => continuation?.progress(),
-  settle: (log, isLost) => prints.settle(log, isLost).then(tellKept),
+  settle: (log, ending) => prints.settle(log, ending).then(tellKept),
 });
 
 /** Tells the page which prints were interrupted. */
@@ -198,6 +200,15 @@ function tellKept(): void {
 async function forget(id: string): Promise<void> {
   if (planner) await archiveOf(planner).forget(id);
   tellKept();
+}
+
+async function tellFile({ id, print, given }: ToMachine & { kind: 'kept-file' }): Promise<void> {
+  if (!planner) return;
+  const prints = archiveOf(planner);
+  const file = await prints.fileOf(print, given);
+  const found: KeptFile =
+    file instanceof Blob ? await locate(planner, prints, print, file) : { kind: 'missing', trouble: file };
+  tell({ kind: 'kept-file', id, found });
 }
 
 async function connectVirtual(
@@ -283,20 +294,21 @@ function wish(id: number, wanted: Wish): void {
 }
 
 /** Where the present connection keeps what is needed to go on with the print after this page is gone; null for nothing. */
-async function recordFor(facts: PrintFacts, file: Blob): Promise<PrintLog | null> {
+async function recordFor({ facts, file, start, continues }: Print): Promise<PrintLog | null> {
   if (!archive || present?.port.kind !== 'serial') return null;
   const { name, config, port } = present;
-  const about = { facts, machine: { name, config }, port: port.id, fileBytes: file.size };
+  const about = { facts, machine: { name, config }, port: port.id, fileBytes: file.size, start, continues };
   return await archive.begin(about, tellNotKept);
 }
 
-async function print({ id, file, confirmedLines, facts }: ToMachine & { kind: 'print' }): Promise<void> {
+async function print(message: Print): Promise<void> {
+  const { id, file, start, facts } = message;
   const current = connection;
   const parts = current?.parts;
   if (!current || !parts) return tell({ kind: 'answer', id, trouble: null });
   try {
-    const trouble = await parts.machine.print(file, confirmedLines, parts.now, async () => {
-      const log = await recordFor(facts, file);
+    const trouble = await parts.machine.print(file, start, parts.now, async () => {
+      const log = await recordFor(message);
       if (log) archive?.copy(log, file);
       return log;
     });
@@ -325,6 +337,9 @@ self.onmessage = ({ data }: MessageEvent<ToMachine>): void => {
       break;
     case 'held-file':
       continuation?.give(data.file);
+      break;
+    case 'kept-file':
+      void tellFile(data);
       break;
     case 'forget':
       void forget(data.id);

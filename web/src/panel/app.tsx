@@ -16,6 +16,7 @@ import { Notices } from './notices';
 import { dropped } from './open_file';
 import { Asked } from './question';
 import { SettingsDialog } from './settings_dialog';
+import { StartDialog } from './start_dialog';
 import { Temperatures } from './temperatures';
 import { TopBar } from './top_bar';
 import { TroubleBanner } from './trouble_banner';
@@ -89,6 +90,7 @@ export function App(): JSX.Element {
       {openDialog.value === 'machine' && <MachineDialog />}
       {openDialog.value === 'settings' && <SettingsDialog />}
       <HeldDialog />
+      <StartDialog />
       <Asked />
     </>
   );

@@ -20,7 +20,7 @@ const HAS_SERIAL = 'serial' in navigator;
 const FAULTS_EXAMPLE = 'sensor-open=extruder@90';
 const FAULTS_CHARACTERS_MAX = 500;
 const FAULTS_HINT =
-  'What breaks, and at which second after power-up: sensor-open, sensor-short, heater-dead, heater-stuck-on (=extruder or heater_bed), endstop-stuck-on, endstop-stuck-off (=x, y or z), unplug, replug. Damage to the bytes all the time: corrupt, drop, duplicate, delay (=probability). Several are separated by commas.';
+  'What breaks, and at which second after power-up: sensor-open, sensor-short, heater-dead, heater-stuck-on (=extruder or heater_bed), endstop-stuck-on, endstop-stuck-off (=x, y or z), unplug, replug, board-reset; outage and power-loss (=seconds). Damage to the bytes all the time: corrupt, drop, duplicate, delay (=probability). Several are separated by commas.';
 
 const known = signal<readonly SerialPort[]>([]);
 const chosen = signal<SerialPort | null>(null);

@@ -5,7 +5,9 @@ const HEATERS = ['extruder', 'heater_bed'] as const;
 const AXES = ['x', 'y', 'z'] as const;
 /** Faults on bytes, with a probability. */
 const BYTES = ['corrupt', 'drop', 'duplicate', 'delay'] as const;
-const CABLE = ['unplug', 'replug'] as const;
+const CABLE = ['unplug', 'replug', 'board-reset'] as const;
+/** Faults that last for so many seconds. */
+const LASTING = ['outage', 'power-loss'] as const;
 const PARTS: Readonly<Record<string, readonly string[]>> = {
   'sensor-open': HEATERS,
   'sensor-short': HEATERS,
@@ -33,8 +35,13 @@ function problemOf(item: string): string | null {
       : `needs a probability from 0 to 1, as in ${name}=0.01`;
   }
   if (isOne(CABLE, name)) return value === undefined ? null : `takes no part, as in ${name}@60`;
+  if (isOne(LASTING, name))
+    return value !== undefined && NUMBER.test(value) && Number(value) <= SECONDS_MAX
+      ? null
+      : `needs a number of seconds that it lasts, as in ${name}=5@60`;
   const parts = PARTS[name];
-  if (!parts) return `is not known; there are ${listed([...Object.keys(PARTS), ...CABLE, ...BYTES])}`;
+  if (!parts)
+    return `is not known; there are ${listed([...Object.keys(PARTS), ...CABLE, ...LASTING, ...BYTES])}`;
   return value !== undefined && parts.includes(value) ? null : `needs one of ${listed(parts)} after =`;
 }
 

@@ -2,7 +2,7 @@
 // user's word. Nothing here moves anything before that word.
 import { effect, signal } from '@preact/signals';
 import type { JSX } from 'preact';
-import type { HeldPrint, KeptPrint, Trouble } from '../machine/protocol';
+import type { HeldPrint, KeptPrint } from '../machine/protocol';
 import { timeOf } from '../state/interrupted';
 import { heldPrint } from '../state/kept';
 import { giveHeldFile, job, snapshot, wish } from '../state/machine';
@@ -10,9 +10,10 @@ import { notify, withdraw } from '../state/notices';
 import { EmergencyStop } from './emergency';
 import { Fact } from './facts';
 import { formatBytes, formatDuration, formatNumber } from './numbers';
-import { ACCEPTED } from './open_file';
+import { pickWith } from './open_file';
 import { Button, Dialog } from './parts';
 import { ask } from './question';
+import { Said } from './said';
 
 /** The user wants to see something else first. */
 const isPutAway = signal(false);
@@ -26,7 +27,7 @@ const HEATERS = { extruder: 'Nozzle', heater_bed: 'Bed' } as const;
 function restart(): void {
   ask({
     title: 'Restart the board?',
-    text: 'That ends the print for good: the motors let go, the heaters are switched off, and everything has to be homed.',
+    text: 'The motors let go, the heaters are switched off, and everything has to be homed. The print cannot go on with its next step then, but from a line, as after a loss of power.',
     yes: 'Restart the board',
     no: 'Leave it as it is',
     act: () => void wish({ kind: 'firmware-restart' }),
@@ -48,17 +49,6 @@ async function resume(): Promise<void> {
   isUnderWay.value = true;
   isResumed.value = await wish({ kind: 'resume' });
   isUnderWay.value = false;
-}
-
-function pick(): void {
-  const input = document.createElement('input');
-  input.type = 'file';
-  input.accept = ACCEPTED;
-  input.onchange = () => {
-    const picked = input.files?.[0];
-    if (picked) giveHeldFile(picked);
-  };
-  input.click();
 }
 
 /** How long it has been so, in words. */
@@ -91,16 +81,6 @@ function Known({ print }: { readonly print: KeptPrint }): JSX.Element {
   );
 }
 
-function Said({ of: { happened, safe, todo } }: { readonly of: Trouble }): JSX.Element {
-  return (
-    <div class="stack" role="alert">
-      <p class="trouble-what">{happened}</p>
-      <p>{safe}</p>
-      <p>{todo}</p>
-    </div>
-  );
-}
-
 const Restart = (): JSX.Element => (
   <Button kind="danger" class="big" onClick={restart}>
     Restart the board
@@ -108,7 +88,7 @@ const Restart = (): JSX.Element => (
 );
 
 const OpenFile = ({ text }: { readonly text: string }): JSX.Element => (
-  <Button kind="primary" class="big" icon="file" onClick={pick}>
+  <Button kind="primary" class="big" icon="file" onClick={() => pickWith(giveHeldFile)}>
     {text}
   </Button>
 );
@@ -164,7 +144,7 @@ function Body({ held }: { readonly held: HeldPrint }): JSX.Element {
           <Said of={held.trouble} />
           <p>
             What is printed so far stays on the bed. The board goes on holding it until it is restarted or
-            switched off.
+            switched off; after that the print can go on from a line.
           </p>
           <Known print={held.print} />
           <div class="dialog-foot">

@@ -1,10 +1,9 @@
 // The file as a print: what it takes, what stands against it, and starting, pausing, ending it.
-import { computed, effect, signal } from '@preact/signals';
+import { effect, signal } from '@preact/signals';
 import type { JSX } from 'preact';
 import type { Summary } from '../preview/protocol';
-import { unconfirmed } from '../state/confirm';
-import { connection, isPrinting, isReady, job, outcome, snapshot, wish } from '../state/machine';
-import { closeFile, failure, file, type OpenFile, openFile, reading, summary } from '../state/preview';
+import { connection, isPrinting, job, outcome, snapshot, wish } from '../state/machine';
+import { closeFile, file, type OpenFile, openFile, summary } from '../state/preview';
 import {
   finishesIn,
   heatingUp,
@@ -14,33 +13,19 @@ import {
   printed,
   printShown,
   progress,
+  reached,
 } from '../state/print';
+import { isToBegin, starting, startObstacle } from '../state/start';
+import { askWhereToBegin } from '../state/start_request';
 import { Fact } from './facts';
 import { Findings } from './findings';
 import { Icon } from './icons';
-import { machineSummary } from './machine_summary';
 import { formatBytes, formatDuration, formatNumber } from './numbers';
+import { obstacle } from './obstacle';
 import { pickFile } from './open_file';
 import { Button } from './parts';
 import { ask } from './question';
-import { notReady } from './reasons';
-
-/** Why the file cannot be printed now; null where it can. */
-const obstacle = computed<string | null>(() => {
-  if (!file.value) return null;
-  if (reading.value !== null) return 'The file is still being read.';
-  if (failure.value || !summary.value) return 'The file could not be read.';
-  if (summary.value.errors.length > 0) return 'The file cannot be printed on this machine: see below.';
-  if (!machineSummary.value) return 'The machine file has errors: mend it under Machine.';
-  if (connection.value === 'closed') return 'Connect a printer to print.';
-  if (!isReady.value) return notReady.value;
-  const open = unconfirmed.value.length;
-  if (open > 0)
-    return open === 1
-      ? 'A command has to be confirmed first: see below.'
-      : `${open} commands have to be confirmed first: see below.`;
-  return null;
-});
+import { StartSteps } from './start_steps';
 
 function cancel(): void {
   ask({
@@ -107,8 +92,16 @@ function Running({ far, filament }: { readonly far: Progress; readonly filament:
 
 const HEATERS = { extruder: 'nozzle', heater_bed: 'bed' } as const;
 
+/** What a print that begins in the middle of its file is waiting for. */
+function waitingToBegin(line: number): string {
+  if (isToBegin.value) return startObstacle.value ?? `Ready to begin with line ${formatNumber(line)}.`;
+  return `Reading the file up to line ${formatNumber(line)}. Nothing moves.`;
+}
+
 /** What the print is waiting for, in words. */
 function waiting(): string | null {
+  const begun = starting.value;
+  if (begun && job.value !== 'ending') return waitingToBegin(begun.place.line);
   if (job.value === 'paused')
     return 'Paused. The heaters stay on; the head can be moved by hand and goes back.';
   if (job.value === 'held')
@@ -163,18 +156,27 @@ function Actions(): JSX.Element {
   if (state === 'none') {
     const again = outcome.value !== null && isShown.value;
     return (
-      <Button
-        kind="primary"
-        icon="play"
-        class="big"
-        busy={busy}
-        why={obstacle.value}
-        onClick={() => {
-          if (obstacle.value === null) void once(printShown);
-        }}
-      >
-        {again ? 'Print again' : 'Print'}
-      </Button>
+      <>
+        <Button
+          kind="primary"
+          icon="play"
+          class="big"
+          busy={busy}
+          why={obstacle.value}
+          onClick={() => {
+            if (obstacle.value === null) void once(() => printShown());
+          }}
+        >
+          {again ? 'Print again' : 'Print'}
+        </Button>
+        <Button
+          class="big"
+          why={obstacle.value}
+          onClick={() => askWhereToBegin(Math.max(2, reached.value + 1))}
+        >
+          Print from a line…
+        </Button>
+      </>
     );
   }
   const isBusy = state === 'pausing' || state === 'ending';
@@ -186,7 +188,10 @@ function Actions(): JSX.Element {
           icon="play"
           class="big"
           busy={busy}
-          onClick={() => void once(() => wish({ kind: 'resume' }))}
+          why={startObstacle.value}
+          onClick={() => {
+            if (startObstacle.value === null) void once(() => wish({ kind: 'resume' }));
+          }}
         >
           Resume
         </Button>
@@ -295,6 +300,7 @@ export function Job(): JSX.Element | null {
           {hint && <p class="hint grow">{hint}</p>}
         </div>
       )}
+      <StartSteps />
       {running && <Visitor job={running} />}
       <Outcome />
       <Findings />

@@ -1,12 +1,15 @@
 // Moving by hand: position, home, jog, extrude, motors off.
+import { computed } from '@preact/signals';
 import type { JSX } from 'preact';
 import type { Axis } from '../machine/protocol';
 import { isReady, snapshot, wish } from '../state/machine';
 import { change, EXTRUDE_MAX_MM, EXTRUDE_SPEED_MAX_MM_S, JOG_STEPS, settings } from '../state/settings';
+import { isToBegin } from '../state/start';
 import { mm } from '../units';
 import { machineSummary } from './machine_summary';
 import { formatNumber } from './numbers';
 import { Button, Card, Choice, NumberField } from './parts';
+import { ask } from './question';
 import { notFree } from './reasons';
 
 const AXES = ['X', 'Y', 'Z'] as const;
@@ -49,6 +52,24 @@ function Position(): JSX.Element | null {
   );
 }
 
+/** Before a print begins in the middle of its file: why axes are not homed by hand. */
+const notHomed = computed<string | null>(() =>
+  isToBegin.value ? 'Resume homes X and Y by itself, once the nozzle is above the part.' : null,
+);
+
+/** With the part on the bed a switch below it is reached through the part. */
+function homeZ(): void {
+  const home = (): void => void wish({ kind: 'home', axes: ['Z'] });
+  if (!isToBegin.value) return home();
+  ask({
+    title: 'Home Z with a part on the bed?',
+    text: 'The nozzle goes to the switch of Z wherever the head is now. Where that switch is below, it runs into whatever stands there.',
+    yes: 'Home Z',
+    no: 'Do not',
+    act: home,
+  });
+}
+
 function JogPad({ why }: { readonly why: string | null }): JSX.Element {
   const step = settings.value.jogStep;
   const homed = snapshot.value?.homed ?? [false, false, false];
@@ -77,7 +98,7 @@ function JogPad({ why }: { readonly why: string | null }): JSX.Element {
           icon="home"
           class="jog centre"
           label="Home all axes"
-          why={notFree.value}
+          why={notFree.value ?? notHomed.value}
           onClick={() => void wish({ kind: 'home', axes: [] })}
         />
         {button('X', 1, 'right', 'Right', 'east')}
@@ -97,6 +118,8 @@ function JogPad({ why }: { readonly why: string | null }): JSX.Element {
 
 function reason(): string | null {
   if (notFree.value) return notFree.value;
+  if (isToBegin.value)
+    return snapshot.value?.homed[2] ? 'Resume homes X and Y.' : 'Say first where Z stands: see Print.';
   if (!(snapshot.value?.homed ?? []).every(Boolean))
     return 'Home first: until then the position is not known.';
   return null;
@@ -177,8 +200,8 @@ export function Motion(): JSX.Element {
           <Button
             key={axis}
             label={`Home ${axis}`}
-            why={notFree.value}
-            onClick={() => void wish({ kind: 'home', axes: [axis] })}
+            why={notFree.value ?? (axis === 'Z' ? null : notHomed.value)}
+            onClick={() => (axis === 'Z' ? homeZ() : void wish({ kind: 'home', axes: [axis] }))}
           >
             {axis}
           </Button>

@@ -7,20 +7,23 @@ import { openFile } from '../state/preview';
 import { importProfile } from '../state/profiles';
 import { openDialog } from './dialogs';
 
-export const ACCEPTED = '.gcode,.gco,.g,.gz,.nc,.txt,text/x.gcode';
+const ACCEPTED = '.gcode,.gco,.g,.gz,.nc,.txt,text/x.gcode';
 const MACHINE_FILE = /\.(cfg|conf)$/i;
 
-/** Lets the user pick a file. */
-export function pickFile(): void {
+/** Lets the user pick a file of G-code, for whatever it is wanted. */
+export function pickWith(take: (file: File) => void): void {
   const input = document.createElement('input');
   input.type = 'file';
   input.accept = ACCEPTED;
   input.onchange = () => {
     const picked = input.files?.[0];
-    if (picked) openFile(picked, picked.name);
+    if (picked) take(picked);
   };
   input.click();
 }
+
+/** Lets the user pick a file to look at. */
+export const pickFile = (): void => pickWith((file) => openFile(file, file.name));
 
 const SAMPLE_MISSING = {
   code: 'sample-missing',

@@ -83,6 +83,10 @@ interface NumberFieldProps {
   /** Why the field cannot be used now; null where it can. */
   readonly why?: string | null;
   readonly hideLabel?: boolean;
+  /** Told whether what is typed cannot be set. Then it stays, with what is wrong with it, when the field is left. */
+  readonly onWrong?: (isWrong: boolean) => void;
+  /** Told of each number as it is typed, not only once the field is left. */
+  readonly live?: boolean;
   /** What is set acts on the machine: only Enter and the button pass it on, and leaving the field puts it away. */
   readonly acts?: boolean;
   /** Called with a number between `min` and `max`: on Enter, and, unless it `acts`, on leaving the field after a change. */
@@ -98,7 +102,7 @@ interface Draft {
   readonly leave: () => void;
 }
 
-function useDraft({ value, min, max, acts, onSet }: NumberFieldProps, isOff: boolean): Draft {
+function useDraft({ value, min, max, acts, onWrong, onSet }: NumberFieldProps, isOff: boolean): Draft {
   const [text, set] = useState<string | null>(null);
   const number = text === null ? value : parseNumber(text);
   const isWrong = number === undefined || number < min || number > max;
@@ -106,6 +110,16 @@ function useDraft({ value, min, max, acts, onSet }: NumberFieldProps, isOff: boo
   useEffect(() => {
     if (isOff) set(null);
   }, [isOff]);
+  // Told of a change alone: several fields may have one listener.
+  const wasWrong = useRef(false);
+  useEffect(() => {
+    if (wasWrong.current !== isWrong) onWrong?.(isWrong);
+    wasWrong.current = isWrong;
+  }, [isWrong, onWrong]);
+  // It was set from elsewhere: what is typed is out of date.
+  useEffect(() => {
+    if (onWrong) set(null);
+  }, [value, onWrong]);
   const commit = (): void => {
     if (text === null || isWrong || isOff) return;
     set(null);
@@ -113,14 +127,14 @@ function useDraft({ value, min, max, acts, onSet }: NumberFieldProps, isOff: boo
   };
   const leave = (): void => {
     if (!acts) commit();
-    set(null);
+    if (!onWrong || !isWrong) set(null);
   };
   return { text, isWrong, set, commit, leave };
 }
 
 /** A number to type, with its unit; what is no number, or out of range, is said and not passed on. */
 export function NumberField(props: NumberFieldProps): JSX.Element {
-  const { label, unit, value, min, max, decimals = 0, disabled, why, hideLabel, acts } = props;
+  const { label, unit, value, min, max, decimals = 0, disabled, why, hideLabel, acts, live, onSet } = props;
   const id = useId();
   const isOff = Boolean(disabled || why);
   const { text, isWrong, set, commit, leave } = useDraft(props, isOff);
@@ -148,7 +162,12 @@ export function NumberField(props: NumberFieldProps): JSX.Element {
           aria-invalid={isWrong}
           aria-describedby={isWrong ? `${id}-hint` : undefined}
           onFocus={(event) => event.currentTarget.select()}
-          onInput={(event) => set(event.currentTarget.value)}
+          onInput={(event) => {
+            const typed = event.currentTarget.value;
+            set(typed);
+            const number = live ? parseNumber(typed) : undefined;
+            if (number !== undefined && number >= min && number <= max) onSet(number);
+          }}
           onKeyDown={(event) => {
             if (event.key === 'Enter') {
               event.preventDefault();

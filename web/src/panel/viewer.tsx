@@ -8,11 +8,14 @@ import { isPrinting, isReady, snapshot } from '../state/machine';
 import { file, reading, setSink, summary } from '../state/preview';
 import { isShown, printedVertex } from '../state/print';
 import { change, settings } from '../state/settings';
+import { lineOfLayer } from '../state/start';
+import { askWhereToBegin } from '../state/start_request';
 import { isDark } from '../state/theme';
 import { Icon } from './icons';
 import { Legend } from './legend';
 import { machineSummary } from './machine_summary';
 import { formatNumber } from './numbers';
+import { obstacle } from './obstacle';
 import { openSample, pickFile } from './open_file';
 import { Button } from './parts';
 
@@ -177,6 +180,21 @@ function LayerSlider(): JSX.Element | null {
   );
 }
 
+/** Not while something is printed, and not for all of the file. */
+function FromLayer(): JSX.Element | null {
+  const plan = summary.value;
+  const top = topLayer.value;
+  if (!plan || top === null || top < 1 || isPrinting.value) return null;
+  return (
+    <Button
+      why={obstacle.value}
+      onClick={() => askWhereToBegin(lineOfLayer(plan, Math.min(top, plan.layers.length - 1) + 1))}
+    >
+      Print from this layer…
+    </Button>
+  );
+}
+
 function Directions(): JSX.Element {
   return (
     <fieldset class="directions">
@@ -234,6 +252,7 @@ export function Viewer(): JSX.Element {
       {summary.value && !viewFailure.value && (
         <div class="viewer-bar">
           <LayerSlider />
+          <FromLayer />
           <label class="check">
             <input
               type="checkbox"

@@ -88,9 +88,10 @@ function fromSummary(summary: PreviewSummary): Summary {
     filament: mm(summary.filament_mm),
     bounds: bounds && { min: corner(bounds[0]), max: corner(bounds[1]) },
     vertices: summary.vertices,
-    layers: summary.layers.map(({ first_vertex, z_mm, time_s }) => ({
+    layers: summary.layers.map(({ first_vertex, first_line, z_mm, time_s }) => ({
       first: first_vertex,
       z: mm(z_mm),
+      line: first_line,
       time: seconds(time_s),
     })),
     time: summary.print_time_s === null ? null : seconds(summary.print_time_s),

@@ -15,6 +15,8 @@ export interface Layer {
   /** The layer's first vertex. */
   readonly first: number;
   readonly z: Mm;
+  /** A print that begins with this line makes the whole layer; 1 for the first. */
+  readonly line: number;
   readonly time: Seconds;
 }
 
@@ -53,9 +55,15 @@ export interface HeaterLimits {
   readonly extrudeMin: Celsius | null;
 }
 
+export interface MachineAxis {
+  readonly name: string;
+  readonly min: Mm;
+  readonly max: Mm;
+}
+
 /** What a printer.cfg describes. */
 export interface MachineSummary {
-  readonly axes: readonly { readonly name: string; readonly min: Mm; readonly max: Mm }[];
+  readonly axes: readonly MachineAxis[];
   readonly heaters: readonly HeaterLimits[];
   /** The longest push of filament at once; null where the file sets none. */
   readonly extrudeMax: Mm | null;
@@ -85,7 +93,15 @@ export type ToPreview =
       readonly name: string;
       readonly config: string | null;
     }
-  | { readonly kind: 'check-config'; readonly id: number; readonly text: string };
+  | { readonly kind: 'check-config'; readonly id: number; readonly text: string }
+  /** Asks for lines of a file; what was asked before is of no interest any more. */
+  | {
+      readonly kind: 'lines';
+      readonly id: number;
+      readonly file: Blob;
+      readonly first: number;
+      readonly last: number;
+    };
 
 export type FromPreview =
   | { readonly kind: 'loaded' }
@@ -96,4 +112,6 @@ export type FromPreview =
   | { readonly kind: 'marks'; readonly job: number; readonly marks: Uint32Array<ArrayBuffer> }
   | { readonly kind: 'progress'; readonly job: number; readonly bytes: number }
   | { readonly kind: 'summary'; readonly job: number; readonly summary: Summary }
+  /** Fewer where the file ends before; none where it cannot be read. */
+  | { readonly kind: 'lines'; readonly id: number; readonly texts: readonly string[] }
   | { readonly kind: 'config'; readonly id: number; readonly report: ConfigReport };

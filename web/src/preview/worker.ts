@@ -1,6 +1,6 @@
 // The preview worker: reads a file through the planner's preview and hands out geometry, findings and estimates. Also
 // checks printer.cfg texts. One file at a time: a new one ends the reading of the one before.
-import { FileChunks } from '../files';
+import { FileChunks, linesOf } from '../files';
 import { fileUnreadable, plannerMissing } from '../machine/troubles';
 import { type FilePreview, loadReader, type Reader } from './planner';
 import type { FromPreview, ToPreview } from './protocol';
@@ -103,8 +103,18 @@ async function checkConfig({ id, text }: ToPreview & { kind: 'check-config' }): 
   }
 }
 
+/** The last question for lines. */
+let asked = 0;
+
+async function tellLines({ id, file, first, last }: ToPreview & { kind: 'lines' }): Promise<void> {
+  asked = id;
+  const texts = await linesOf(file, first, last, () => asked === id).catch(() => []);
+  if (asked === id) tell({ kind: 'lines', id, texts });
+}
+
 self.onmessage = ({ data }: MessageEvent<ToPreview>): void => {
   if (data.kind === 'open') void open(data);
+  else if (data.kind === 'lines') void tellLines(data);
   else void checkConfig(data);
 };
 

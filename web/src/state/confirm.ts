@@ -50,6 +50,12 @@ export function confirmGroup({ lines }: Group, yes: boolean): void {
   confirmed.value = all;
 }
 
+/** Confirms what had been confirmed for the same file before. */
+export function confirmAgain(lines: ConfirmedLines): void {
+  if (lines !== 'all') confirmed.value = new Set([...confirmed.value, ...lines]);
+  else for (const group of unconfirmed.value) confirmGroup(group, true);
+}
+
 /** What is printed without. */
 export const consent = computed<ConfirmedLines>(() =>
   rest.value && unconfirmed.value.length === 0 ? 'all' : [...confirmed.value].filter((line) => line !== REST),

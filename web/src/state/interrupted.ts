@@ -2,13 +2,16 @@
 // the file of one that was taken up. Nothing of it connects or moves by itself.
 import { computed, effect } from '@preact/signals';
 import type { KeptPrint } from '../machine/protocol';
+import type { Summary } from '../preview/protocol';
 import { heldPrint, keptPrints } from './kept';
-import { connection, forgetPrint, isReady, lookForPrints, port } from './machine';
+import { connection, forgetPrint, isPrinting, isReady, lookForPrints, port } from './machine';
 import { notify, withdraw } from './notices';
 import { file, lineMarks, openFile, summary } from './preview';
 import { printed } from './print';
 import { activeProfile, newProfileId, PROFILES_MAX, profiles, saveProfile } from './profiles';
 import { change } from './settings';
+import { lineAfter, type Place, placeOf } from './start';
+import { askToContinue } from './start_request';
 import { watched } from './watched';
 
 /** So many are spoken of. */
@@ -43,10 +46,10 @@ export const endedBy = (device: KeptPrint['port'], config: string): readonly Kep
       port.vendor === device.vendor && port.product === device.product && machine.config !== config,
   );
 
-/** The board is ready and holds nothing: what was interrupted on it cannot go on any more. */
+/** The board is ready, prints nothing and holds nothing: what was interrupted on it cannot go on any more. */
 const lost = computed<readonly KeptPrint[]>(() => {
-  const [choice, isOpen] = [port.value, isReady.value];
-  if (!isOpen || choice?.kind !== 'serial' || heldPrint.value) return [];
+  const [choice, isFree] = [port.value, isReady.value && !isPrinting.value];
+  if (!isFree || choice?.kind !== 'serial' || heldPrint.value) return [];
   const { vendor, product } = choice.id;
   return keptPrints.value.filter(
     ({ port, machine }) =>
@@ -58,12 +61,22 @@ function tell(print: KeptPrint, isLost: boolean, connect: (print: KeptPrint) => 
   const happened = `The print of ${print.facts.name} was interrupted on ${timeOf(print.heardOf)}${lineOf(print)}.`;
   const kind = KIND + print.id;
   const forget = { text: 'Forget it', act: () => forgetPrint(print.id) };
-  if (isLost)
+  if (isLost) {
+    const line = lineAfter(print);
+    const hope = line === null ? 'and nothing had been printed yet' : 'but it can go on from a line';
     return notify({
       kind,
-      text: `${happened} The board does not hold it any more: it cannot go on with its next step.`,
+      text: `${happened} The board does not hold it any more: it cannot go on with its next step, ${hope}.`,
+      ...(line !== null && {
+        action: {
+          text: 'Continue from a line…',
+          act: () => void askToContinue(print),
+          why: null,
+        },
+      }),
       other: forget,
     });
+  }
   notify({
     kind,
     text: `${happened} Connect the printer to see whether it can go on; do not switch the printer off before.`,
@@ -92,6 +105,10 @@ export function followInterrupted(connect: (print: KeptPrint) => void): void {
   followTakenUp();
 }
 
+/** Where a print began, where that was not the beginning. */
+const fromOf = ({ startLine }: KeptPrint, plan: Summary): Place | null =>
+  startLine === null ? null : placeOf(plan, startLine);
+
 /** The file of a print that was taken up is shown, and is what is printed. */
 function followTakenUp(): void {
   effect(() => {
@@ -102,6 +119,12 @@ function followTakenUp(): void {
     if (known?.name === name && known.blob.size === held.file.size) return;
     if (file.peek()?.blob !== held.file) openFile(held.file, name);
     const found = summary.value;
-    if (found) printed.value = { file: { name, blob: held.file }, summary: found, marks: lineMarks() };
+    if (found)
+      printed.value = {
+        file: { name, blob: held.file },
+        summary: found,
+        marks: lineMarks(),
+        from: fromOf(held.print, found),
+      };
   });
 }

@@ -3,11 +3,12 @@
 import { computed, signal } from '@preact/signals';
 import type { VirtualState } from '../bindings/VirtualState';
 import type {
-  ConfirmedLines,
   FromMachine,
+  KeptFile,
   MachineEvent,
   PortChoice,
   PrintFacts,
+  PrintStart,
   Snapshot,
   ToMachine,
   Trouble,
@@ -69,6 +70,9 @@ let isBegun = false;
 let heldFor: Trouble | null = null;
 let newsTimer: ReturnType<typeof setTimeout> | undefined;
 const waiting = new Map<number, (answer: Answer) => void>();
+/** For files of kept prints; a worker that is gone has none. */
+const filesWaiting = new Map<number, (found: KeptFile) => void>();
+const NO_FILE: KeptFile = { kind: 'missing', trouble: null };
 
 /** Starts the worker, which loads the planner. */
 export function startMachine(): void {
@@ -123,6 +127,8 @@ function closed(reason: Trouble | null): void {
   news();
   for (const settle of waiting.values()) settle('gone');
   waiting.clear();
+  for (const settle of filesWaiting.values()) settle(NO_FILE);
+  filesWaiting.clear();
   if (reason) report(reason);
   if (reason?.code === 'planner-missing') plannerFailed.value = true;
   if (wasOpen) note('info', 'Disconnected.');
@@ -179,6 +185,10 @@ function take(message: FromMachine): void {
       notify({ kind: 'not-kept', text: `${happened} ${safe} ${todo}` });
       break;
     }
+    case 'kept-file':
+      filesWaiting.get(message.id)?.(message.found);
+      filesWaiting.delete(message.id);
+      break;
     case 'answer': {
       waiting.get(message.id)?.(message.trouble);
       waiting.delete(message.id);
@@ -266,6 +276,16 @@ function happened(event: MachineEvent): void {
 
 /** The file of the print that the board holds, where the page has no copy of it. */
 export const giveHeldFile = (file: Blob): void => send({ kind: 'held-file', file });
+/** The file of a kept print: its copy, or what the user has given, where that is it. */
+export function keptFile(print: string, given: Blob | null): Promise<KeptFile> {
+  lastId += 1;
+  const id = lastId;
+  return new Promise((resolve) => {
+    if (!worker) return resolve(NO_FILE);
+    filesWaiting.set(id, resolve);
+    send({ kind: 'kept-file', id, print, given });
+  });
+}
 /** Nothing of an interrupted print is to be kept. */
 export const forgetPrint = (id: string): void => send({ kind: 'forget', id });
 /** Another tab may have changed which prints are kept. */
@@ -317,10 +337,16 @@ export async function wish(wanted: Wish): Promise<boolean> {
   return isDone(await ask((id) => ({ kind: 'wish', id, wish: wanted })));
 }
 
-export async function print(file: Blob, facts: PrintFacts, confirmedLines: ConfirmedLines): Promise<boolean> {
+/** `continues` is the interrupted print that it goes on with. */
+export async function print(
+  file: Blob,
+  facts: PrintFacts,
+  start: PrintStart,
+  continues: string | null = null,
+): Promise<boolean> {
   outcome.value = null;
   withdraw('not-kept');
-  isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, facts, confirmedLines })));
+  isBegun = isDone(await ask((id) => ({ kind: 'print', id, file, facts, start, continues })));
   return isBegun;
 }
 

@@ -45,6 +45,8 @@ interface WaitingCheck {
   isRepeated: boolean;
 }
 const configs = new Map<number, WaitingCheck>();
+/** The last question for lines of a file; those before it are not answered. */
+let lookingAt: { readonly id: number; readonly settle: (texts: readonly string[]) => void } | undefined;
 
 function startWorker(): void {
   const started = new Worker(new URL('../preview/worker.ts', import.meta.url), {
@@ -74,6 +76,8 @@ function died(message: string): void {
     reading.value = null;
     failure.value = lastDeath;
   }
+  lookingAt?.settle([]);
+  lookingAt = undefined;
   if (deaths <= DEATHS_MAX) startWorker();
   for (const [id, check] of configs) {
     if (check.isRepeated || !worker) {
@@ -155,8 +159,26 @@ export function checkConfig(text: string): Promise<ConfigReport> {
   });
 }
 
+/** Lines of a file, `first` to `last`; none where they cannot be read, or others were asked for meanwhile. */
+export function linesOf(blob: Blob, first: number, last: number): Promise<readonly string[]> {
+  lookingAt?.settle([]);
+  configId += 1;
+  const id = configId;
+  return new Promise((settle) => {
+    if (!worker) return settle([]);
+    lookingAt = { id, settle };
+    send({ kind: 'lines', id, file: blob, first, last });
+  });
+}
+
 function take(message: FromPreview): void {
   if (message.kind === 'loaded') return;
+  if (message.kind === 'lines') {
+    if (lookingAt?.id !== message.id) return;
+    lookingAt.settle(message.texts);
+    lookingAt = undefined;
+    return;
+  }
   if (message.kind === 'config') {
     configs.get(message.id)?.settle(message.report);
     configs.delete(message.id);

@@ -1,18 +1,21 @@
 // The print that runs, or that ran last: its file, and how far it is. Another file may be looked at meanwhile, so
 // nothing here depends on the one that is shown.
 import { computed, effect, signal } from '@preact/signals';
-import type { Snapshot } from '../machine/protocol';
+import type { Interruption, KeptPrint, Snapshot } from '../machine/protocol';
 import type { Layer, Summary } from '../preview/protocol';
 import { consent } from './confirm';
-import { isPrinting, outcome, port, print, snapshot } from './machine';
+import { isPrinting, outcome, port, print, snapshot, wish } from './machine';
 import type { LineMarks } from './marks';
 import { file, lineMarks, type OpenFile, summary } from './preview';
+import { begin, type Place } from './start';
 
 /** A file as it was when its print was started. */
 export interface PrintedFile {
   readonly file: OpenFile;
   readonly summary: Summary;
   readonly marks: LineMarks;
+  /** Where it began, where that was not the beginning. */
+  readonly from: Place | null;
 }
 
 export interface Progress {
@@ -41,14 +44,32 @@ const filamentBefore = signal(0);
 /** Whether the file that is shown is the one that is, or was, printed. */
 export const isShown = computed(() => printed.value !== null && printed.value.file.blob === file.value?.blob);
 
-/** Starts the print of the file that is shown. */
-export async function printShown(): Promise<void> {
+/** The last line that is known to be made of the file that was printed last, and is shown; 0 for none. */
+const lastLine = signal(0);
+export const reached = computed(() => (isShown.value && outcome.value !== 'done' ? lastLine.value : 0));
+
+/**
+ * Starts the print of the file that is shown: from its beginning or from a place in it, as one of its own or in the place
+ * of one that was interrupted `at` some place. True where it is begun.
+ */
+export async function printShown(
+  from: Place | null = null,
+  lost: KeptPrint | null = null,
+  at: Interruption | null = null,
+): Promise<boolean> {
   const [open, found] = [file.value, summary.value];
-  if (!open || !found) return;
+  if (!open || !found) return false;
   const before = printed.value;
-  printed.value = { file: open, summary: found, marks: lineMarks() };
+  printed.value = { file: open, summary: found, marks: lineMarks(), from };
   const facts = { name: open.name, time: found.time, lines: found.lines };
-  if (!(await print(open.blob, facts, consent.value))) printed.value = before;
+  const start = { confirmedLines: consent.value, line: from?.line ?? null };
+  const isBegun = await print(open.blob, facts, start, lost?.id ?? null);
+  if (!isBegun) printed.value = before;
+  else if (from) begin(from, at);
+  // As they were when it was interrupted.
+  if (isBegun && at && at.speedFactor !== 1) await wish({ kind: 'speed-factor', value: at.speedFactor });
+  if (isBegun && at && at.flowFactor !== 1) await wish({ kind: 'flow-factor', value: at.flowFactor });
+  return isBegun;
 }
 
 /** The layer in which a vertex lies, counted from 1; 0 before the first. */
@@ -65,9 +86,12 @@ export function layerOf(layers: readonly Layer[], vertex: number): number {
 type Done = Pick<Snapshot, 'line' | 'elapsed' | 'speedFactor' | 'position'>;
 
 /** How far a print is. */
-export function progressOf({ summary: plan, marks }: PrintedFile, now: Done, before = 0): Progress {
-  const [done, all] = plan.time === null ? [now.line, plan.lines] : [now.elapsed, plan.time];
-  const vertex = marks.vertexAt(now.line);
+export function progressOf({ summary: plan, marks, from }: PrintedFile, now: Done, before = 0): Progress {
+  // What was made before the print began in the middle of its file counts as done.
+  const line = Math.max(now.line, (from?.line ?? 1) - 1);
+  const planned = (from?.before ?? 0) + now.elapsed;
+  const [done, all] = plan.time === null ? [line, plan.lines] : [planned, plan.time];
+  const vertex = marks.vertexAt(line);
   return {
     share: all > 0 ? Math.min(1, done / all) : 0,
     elapsed: now.elapsed,
@@ -75,10 +99,10 @@ export function progressOf({ summary: plan, marks }: PrintedFile, now: Done, bef
     left:
       plan.time === null
         ? null
-        : Math.max(0, plan.time - now.elapsed) / Math.max(SPEED_FACTOR_MIN, now.speedFactor),
+        : Math.max(0, plan.time - planned) / Math.max(SPEED_FACTOR_MIN, now.speedFactor),
     layer: vertex === 0 ? 0 : layerOf(plan.layers, vertex),
     layers: plan.layers.length,
-    line: now.line,
+    line,
     filament: now.position && Math.max(0, now.position[3] - before),
   };
 }
@@ -106,7 +130,9 @@ export const heatingUp = computed(() => {
 /** The last vertex that has been printed of the file that is shown; null where that is not being printed. */
 export function printedVertex(): number | null {
   const [job, now] = [printed.peek(), snapshot.peek()];
-  return job && now && isPrinting.peek() && isShown.peek() ? job.marks.vertexAt(now.line) : null;
+  return job && now && isPrinting.peek() && isShown.peek()
+    ? job.marks.vertexAt(Math.max(now.line, (job.from?.line ?? 1) - 1))
+    : null;
 }
 
 const WAITING = { paused: 'Paused', held: 'Held' } as const;
@@ -123,8 +149,19 @@ export function titleOf(name: string | null, share: number | null, state: string
   return word && name !== null ? `${word} – ${name} – Stepcast` : 'Stepcast';
 }
 
+/** Remembers how far a print has got. */
+function followLine(): void {
+  let last: PrintedFile | null = null;
+  effect(() => {
+    if (printed.value !== last) lastLine.value = 0;
+    last = printed.value;
+    if (isPrinting.value) lastLine.value = Math.max(snapshot.value?.line ?? 0, (last?.from?.line ?? 1) - 1);
+  });
+}
+
 /** Keeps the tab's title up to date, and what the print began with. */
 export function followPrint(): void {
+  followLine();
   effect(() => {
     const now = snapshot.value;
     if (now?.job === 'printing' && now.elapsed === 0) filamentBefore.value = now.position?.[3] ?? 0;

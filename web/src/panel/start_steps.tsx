@@ -1,0 +1,218 @@
+// What there is to do before a print goes on that begins in the middle of its file: say where Z stands, and look at the
+// part. Step by step, beside the controls for moving by hand; Resume waits for it.
+import { signal } from '@preact/signals';
+import type { ComponentChildren, JSX } from 'preact';
+import type { Interruption } from '../machine/protocol';
+import { snapshot, wish } from '../state/machine';
+import {
+  isPartThere,
+  isToBegin,
+  nearestPlace,
+  noteZ,
+  placeNear,
+  type Starting,
+  starting,
+} from '../state/start';
+import { mm } from '../units';
+import { Icon } from './icons';
+import { machineSummary } from './machine_summary';
+import { formatNumber } from './numbers';
+import { Button, Choice, NumberField } from './parts';
+
+const Z = 2;
+/** A sheet of paper. */
+const PAPER_MM = 0.1;
+/** Nearer than this is the same. */
+const NEAR_MM = 0.005;
+
+/** What is typed for Z; null: what is proposed. */
+const typedZ = signal<{ readonly of: Starting; readonly z: number } | null>(null);
+const axisZ = () => machineSummary.value?.axes[Z];
+
+/** Where Z stands, as far as that is known. */
+const knownZ = (): number | null =>
+  snapshot.value?.homed[Z] ? (snapshot.value.position?.[Z] ?? null) : null;
+
+interface StepProps {
+  readonly title: string;
+  readonly isDone: boolean;
+  readonly children: ComponentChildren;
+}
+
+function Step({ title, isDone, children }: StepProps): JSX.Element {
+  return (
+    <li class={isDone ? 'step done' : 'step'}>
+      <span class="step-mark">{isDone && <Icon name="check" />}</span>
+      <div class="step-body">
+        <h3>
+          {title}
+          {isDone && <span class="unseen"> (done)</span>}
+        </h3>
+        {children}
+      </div>
+    </li>
+  );
+}
+
+const millimetres = (z: number): string => `${formatNumber(z, 2)} mm`;
+
+interface WhereProps {
+  readonly at: Interruption;
+  /** What the user has said so far. */
+  readonly typed: number | null;
+}
+
+/** What the file, the journal and the motor say of Z. */
+function WhereZWas({ at, typed }: WhereProps): JSX.Element {
+  const { zRange, zPlaces, zPitch, zError } = at;
+  if (!zRange) return <p>Z was being moved by hand or homed when the print was interrupted: measure it.</p>;
+  const [low, high] = zRange;
+  const was =
+    high - low < NEAR_MM ? `at ${millimetres(low)}` : `between ${millimetres(low)} and ${millimetres(high)}`;
+  if (zPlaces.length === 0)
+    return (
+      <p>
+        Z was {was}. It may stand up to {millimetres(zError)} from there now: measure it.
+      </p>
+    );
+  const isOne = zPlaces.length === 1;
+  const doubt = zError >= NEAR_MM ? `, give or take ${millimetres(zError)}` : '';
+  return (
+    <>
+      <p>
+        Z was {was}. With current again its motor stands at{' '}
+        {isOne ? millimetres(zPlaces[0] ?? 0) : `one of these places, ${millimetres(zPitch)} apart`}
+        {doubt}, unless the head has sunk.
+        {!isOne && ' Choose one: the likeliest is first. If in doubt, measure.'}
+      </p>
+      {!isOne && (
+        <Choice
+          label="Places where Z can stand"
+          hideLabel
+          choices={zPlaces.map((place, value) => ({ value, text: millimetres(place) }))}
+          value={zPlaces.findIndex((place) => typed !== null && Math.abs(place - typed) < NEAR_MM)}
+          onSet={(index) => type(zPlaces[index] ?? 0)}
+        />
+      )}
+    </>
+  );
+}
+
+interface NearestProps {
+  readonly base: number;
+  readonly pitch: number;
+  readonly value: number;
+}
+
+/** Below the button, which must not move while it is pressed. */
+function Nearest({ base, pitch, value }: NearestProps): JSX.Element | null {
+  const nearest = nearestPlace(base, pitch, value);
+  if (Math.abs(nearest - value) <= NEAR_MM) return null;
+  return (
+    <div class="row wrap">
+      <span class="hint">As far as is known, the motor stands at {millimetres(nearest)} then.</span>
+      <Button onClick={() => type(nearest)}>Take {millimetres(nearest)}</Button>
+    </div>
+  );
+}
+
+function type(z: number): void {
+  const of = starting.value;
+  if (of) typedZ.value = { of, z };
+}
+
+function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
+  const axis = axisZ();
+  const known = knownZ();
+  const { place, at } = begun;
+  const [min, max] = [axis?.min ?? 0, axis?.max ?? 0];
+  const proposed = known ?? at?.zPlaces[0] ?? at?.zRange?.[0] ?? place.top;
+  const typed = typedZ.value?.of === begun ? typedZ.value.z : null;
+  const value = Math.min(Math.max(typed ?? proposed, min), max);
+  const base = placeNear(at, known);
+  const isSaid = known !== null || typed !== null || at?.zPlaces.length === 1;
+  const say = async (): Promise<void> => {
+    if (!(await wish({ kind: 'set-position', axis: 'Z', position: mm(value) }))) return;
+    noteZ(begun, known, value);
+    typedZ.value = null;
+  };
+  return (
+    <Step title="Where Z stands" isDone={known !== null}>
+      {known === null ? (
+        <p>Z cannot be homed with the part in the way: say where the nozzle is.</p>
+      ) : (
+        <p>Taken to stand at {millimetres(known)}. Where that is not so, correct it.</p>
+      )}
+      {at && known === null && <WhereZWas at={at} typed={typed} />}
+      <p class="hint">
+        To measure: say what is likely, then move Z under Motion until a sheet of paper just slides. On the
+        bed, beside the part, that is {formatNumber(PAPER_MM, 1)} mm; on top of the part{' '}
+        {millimetres(place.top + PAPER_MM)}. Then correct it here.
+      </p>
+      <div class="row wrap end">
+        <NumberField
+          label="Z stands at"
+          unit="mm"
+          value={value}
+          min={min}
+          max={max}
+          decimals={3}
+          live
+          onSet={type}
+        />
+        <Button
+          kind={known === null ? 'primary' : 'plain'}
+          why={isSaid ? null : 'Type where Z stands first.'}
+          onClick={() => void say()}
+        >
+          {known === null ? 'Z stands there' : 'Correct Z'}
+        </Button>
+      </div>
+      {base !== null && typed !== null && <Nearest base={base} pitch={at?.zPitch ?? 0} value={value} />}
+    </Step>
+  );
+}
+
+function LookAtPart(): JSX.Element {
+  return (
+    <Step title="Look at the part" isDone={isPartThere.value}>
+      <label class="check">
+        <input
+          type="checkbox"
+          checked={isPartThere.value}
+          onChange={(event) => {
+            isPartThere.value = event.currentTarget.checked;
+          }}
+        />
+        It still sticks to the bed where it was, and nothing stands out of it.
+      </label>
+    </Step>
+  );
+}
+
+/** The steps, while a print waits to begin; nothing otherwise. */
+export function StartSteps(): JSX.Element | null {
+  const begun = starting.value;
+  if (!begun || !isToBegin.value) return null;
+  const { line, layer, z } = begun.place;
+  const { homed = [false, false, false], start = null } = snapshot.value ?? {};
+  const homes = ['X', 'Y'].filter((_, axis) => !homed[axis]).join(' and ');
+  return (
+    <section class="start-steps" aria-label="Before it goes on">
+      <p>
+        The print begins with line {formatNumber(line)}
+        {z !== null && `, in layer ${formatNumber(layer)} at ${millimetres(z)}`}. Two things first:
+      </p>
+      <ol>
+        <SayZ begun={begun} />
+        <LookAtPart />
+      </ol>
+      <p>
+        Then press Resume: the nozzle gets warm enough to come free and goes up to{' '}
+        {millimetres(start?.clearZ ?? 0)},{' '}
+        {homes !== '' && `${homes} ${homes.length > 1 ? 'are' : 'is'} homed, `}
+        everything is heated, and it goes across, down, and on. Keep the way free.
+      </p>
+    </section>
+  );
+}
