@@ -22,7 +22,11 @@ fn scratch(name: &str, content: &str) -> PathBuf {
 }
 
 fn simulate(name: &str, more: &[&str]) -> Value {
-    let file = scratch(&format!("{name}.gcode"), PRINT);
+    simulate_file(name, PRINT, more)
+}
+
+fn simulate_file(name: &str, print: &str, more: &[&str]) -> Value {
+    let file = scratch(&format!("{name}.gcode"), print);
     let machine = scratch(&format!("{name}.cfg"), MACHINE);
     let output = Command::new(env!("CARGO_BIN_EXE_stepcast"))
         .arg("simulate")
@@ -81,4 +85,18 @@ fn nothing_goes_on_without_a_word() {
     let fault = format!("--fault=host-stall=3@{}", on_the_way(&clean));
     let held = simulate("holds-unconfirmed", &[&fault]);
     assert_eq!((&held["error"]["code"], &held["holds"]), (&Value::from("held-host-away"), &Value::from(1)));
+}
+
+#[test]
+fn a_paused_print_is_the_same_print() {
+    // Homing at its end is not taken for a move that was told before the pause.
+    let print = PRINT.replace("M104 S0\n", "G28 X\nM104 S0\n");
+    let clean = simulate_file("pauses-clean", &print, &[]);
+    assert_eq!((&clean["result"], &clean["pauses"]), (&Value::from("done"), &Value::from(0)), "{clean:#}");
+    let at = on_the_way(&clean) - 8.0;
+    let faults = [at, at + 15.0].map(|at| format!("--fault=pause=2@{at}"));
+    let paused = simulate_file("pauses", &print, &faults.each_ref().map(String::as_str));
+    assert_eq!((&paused["result"], &paused["pauses"]), (&Value::from("done"), &Value::from(2)), "{paused:#}");
+    assert_eq!((&paused["holds"], &paused["step_digest"]), (&Value::from(0), &clean["step_digest"]));
+    assert_eq!(paused["motors"]["stepper_z"]["counted_steps"], clean["motors"]["stepper_z"]["counted_steps"]);
 }

@@ -153,7 +153,9 @@ impl Observer {
             }
             Event::RunStarted { at, .. } => self.new_run = Some(self.clock_of(at, printer)),
             Event::Move(scheduled) => self.take_move(&scheduled, printer),
-            Event::RunBroken { at } if !self.is_homing => self.put_aside(at, printer),
+            // An approach to an endstop was told further than it is made.
+            Event::RunBroken { at } if self.is_homing => self.told_until = self.clock_of(at, printer),
+            Event::RunBroken { at } => self.put_aside(at, printer),
             Event::RunResumed { at, .. } => self.go_on(at, printer),
             Event::RunEnded { at } => {
                 if let Some(start) = self.run_start.take() {
@@ -198,7 +200,6 @@ impl Observer {
             }
             Event::Identified { .. }
             | Event::Phase(_)
-            | Event::RunBroken { .. }
             | Event::Temperature { .. }
             | Event::Annotation(_)
             | Event::Object(_)
