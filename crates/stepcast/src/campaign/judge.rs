@@ -108,6 +108,9 @@ impl Judging<'_> {
         if aftermath.pause_is_late {
             finding.broken.push("a pause took longer to rest than its ramp".to_owned());
         }
+        if aftermath.pause_is_forgotten {
+            finding.broken.push("a pause that was accepted did not come".to_owned());
+        }
         let holds_max = u32::from(!edges);
         if report.holds > holds_max {
             finding.broken.push(format!("{} holds, at most {holds_max} expected", report.holds));

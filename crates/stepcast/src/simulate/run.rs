@@ -39,6 +39,8 @@ const WAKE_MIN: Seconds = Seconds(50e-6);
 pub(super) const AFTER: Seconds = Seconds(6.0);
 /// A print in which nothing happens for so long is given up.
 const STALL_MAX: Seconds = Seconds(6.0 * 3600.0);
+/// A pause that is asked for so shortly before the print's end need not come.
+const PAUSE_COMES: Seconds = Seconds(1.0);
 /// A pause rests so much later than its ramp at most.
 const PAUSE_SPARE: Seconds = Seconds(0.2);
 /// How often the nozzle's temperature is looked at.
@@ -140,6 +142,8 @@ pub(crate) struct Aftermath {
     /// ramp and a little.
     pub(crate) pause_rest: Option<Ticks>,
     pub(crate) pause_is_late: bool,
+    /// A pause was accepted and never came.
+    pub(crate) pause_is_forgotten: bool,
     /// The end of the job, before the machine was watched.
     pub(crate) ended: Ticks,
     /// The pulses that came while no line was being executed.
@@ -436,8 +440,13 @@ impl Simulation {
     fn pause(&mut self, now: Seconds) -> bool {
         let Some(wanted) = self.pauses.take(self.printer.now()) else { return false };
         let result = match wanted {
-            // There may be nothing to be paused.
-            Wanted::Pause => self.session.request(Request::Pause, now).or(Ok(())),
+            Wanted::Pause => {
+                let is_paused = self.session.job_status() == JobStatus::Paused;
+                if self.session.request(Request::Pause, now).is_err() || is_paused {
+                    self.pauses.is_refused();
+                }
+                Ok(())
+            }
             Wanted::Resume if self.stage != Stage::Printing => Ok(()),
             Wanted::Resume => self.session.request(Request::Resume, now),
         };
@@ -451,6 +460,8 @@ impl Simulation {
     fn end(&mut self) {
         if !matches!(self.stage, Stage::Watching(_)) {
             self.aftermath.ended = self.printer.now();
+            let before = self.aftermath.ended.saturating_sub(self.ticks(PAUSE_COMES));
+            self.aftermath.pause_is_forgotten = self.pauses.is_forgotten(before);
             self.stage = Stage::Watching(self.printer.now() + self.ticks(self.watched));
         }
     }
