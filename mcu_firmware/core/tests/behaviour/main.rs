@@ -10,6 +10,7 @@ mod inputs;
 mod lease;
 mod link;
 mod outputs;
+mod oven;
 mod progress;
 mod random;
 mod replay;
