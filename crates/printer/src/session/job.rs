@@ -152,6 +152,8 @@ pub(super) struct Job {
     pub(super) paused: Option<Paused>,
     /// Reads up to the line with which it begins.
     pub(super) skip: Option<Skip>,
+    /// The speed and flow factors that the user sets meanwhile: they come into force at that line.
+    pub(super) factors: [Option<f64>; 2],
     pub(super) told: Seconds,
     /// It has made a move.
     pub(super) has_moved: bool,
@@ -167,6 +169,7 @@ impl Job {
             state: JobState::Printing,
             paused: None,
             skip: None,
+            factors: [None; 2],
             told: Seconds(f64::NEG_INFINITY),
             has_moved: false,
             leaves_hot: false,
