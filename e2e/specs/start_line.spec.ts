@@ -262,6 +262,11 @@ async function carryOn(
   await expect(asking).toHaveCount(0);
   await expect(panel.status).toContainText('Paused');
   await expect(panel.job).toContainText(/Z was (at|between)/);
+  const places = panel.job.getByRole('group', { name: 'Places where Z can stand' });
+  const size = page.viewportSize();
+  await page.setViewportSize({ width: 320, height: 720 });
+  expect(await places.evaluate((box) => box.scrollWidth <= box.clientWidth), 'all can be reached').toBe(true);
+  if (size) await page.setViewportSize(size);
   expect(pulses(printer), 'nothing has moved so far').toEqual(still);
   const sinceS = await goOn({ printer, panel }, measureZ);
   await done({ printer, panel });
