@@ -1,6 +1,6 @@
 //! What an owner may ask of a session, and when it is refused.
 
-use units::{Mm, Seconds};
+use units::{Celsius, Mm, Seconds};
 use wire::Command;
 
 use super::{
@@ -177,7 +177,9 @@ impl Session {
         let paused = job.paused.as_ref()?;
         let Start { line, clear_z, .. } = paused.start?;
         let [x, y, z, _] = paused.position;
-        Some(PendingStart { line, position: [x, y, z], clear_z })
+        let targets = [gcode::Heater::Tool(0), gcode::Heater::Bed]
+            .map(|heater| ready.thermal.goal(heater, &paused.targets).max(Celsius::ZERO));
+        Some(PendingStart { line, position: [x, y, z], clear_z, targets })
     }
 
     /// How much motion the board has received and not yet made, in seconds. `None` where no run of motion is being

@@ -35,6 +35,8 @@ pub(super) struct Finding {
     pub(super) z_error_mm: Option<f64>,
     /// The user had to measure Z.
     pub(super) measured: u32,
+    /// It was gone on with after a loss of power: the others had nothing left to print, or nothing printed yet.
+    pub(super) gone_on: u32,
     /// What was promised and did not come.
     pub(super) broken: Vec<String>,
 }
@@ -107,6 +109,9 @@ impl Judging<'_> {
         }
         if aftermath.pause_is_late {
             finding.broken.push("a pause took longer to rest than its ramp".to_owned());
+        }
+        if aftermath.pause_is_forgotten {
+            finding.broken.push("a pause that was accepted did not come".to_owned());
         }
         let holds_max = u32::from(!edges);
         if report.holds > holds_max {

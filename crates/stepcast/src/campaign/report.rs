@@ -28,6 +28,8 @@ pub(super) struct Class {
     z_error_max_mm: Option<f64>,
     /// How often the user had to measure where Z stands.
     measured: u32,
+    /// How many prints were gone on with after their power was lost.
+    gone_on: u32,
     /// Prints that did not keep what is promised.
     broken: u32,
     broken_runs: Vec<Broken>,
@@ -58,6 +60,7 @@ impl Class {
             holds: 0,
             z_error_max_mm: None,
             measured: 0,
+            gone_on: 0,
             broken: 0,
             broken_runs: Vec::new(),
         }
@@ -80,6 +83,7 @@ impl Class {
         self.holds += finding.holds;
         most(&mut self.z_error_max_mm, finding.z_error_mm);
         self.measured += finding.measured;
+        self.gone_on += finding.gone_on;
         if !finding.broken.is_empty() {
             self.broken += 1;
             if self.broken_runs.len() < BROKEN_SHOWN_MAX {
@@ -131,7 +135,11 @@ pub(super) fn text(classes: &[Class]) -> String {
             class.wrong_resumes,
         );
         if let Some(z) = class.z_error_max_mm {
-            let _ = writeln!(text, "  Z {z:.4} mm off at most, measured {} times", class.measured);
+            let _ = writeln!(
+                text,
+                "  Z {z:.4} mm off at most, {} gone on with, measured {} times",
+                class.gone_on, class.measured
+            );
         }
         for broken in &class.broken_runs {
             let Broken { seed, board, window, faults, what } = broken;

@@ -6,6 +6,7 @@
 mod course;
 mod digest;
 mod gcode_path;
+mod host_clock;
 mod lease_tap;
 mod observer;
 mod path_check;
@@ -29,8 +30,9 @@ use printer::{
 use units::Seconds;
 
 pub(crate) use self::{
+    host_clock::HostClock,
     report::{Outcome, Report},
-    run::{Aftermath, HostClock, PATH_ERROR_MAX_MM, Setup, Simulation, Successor},
+    run::{Aftermath, PATH_ERROR_MAX_MM, Setup, Simulation, Successor},
 };
 use crate::{
     check,

@@ -15,6 +15,8 @@ pub(super) struct Pauses {
     resume_at: Option<Ticks>,
     /// When the one was asked for that has not come to rest.
     pub(super) since: Option<Ticks>,
+    /// When the one was asked for that has not come.
+    awaited: Option<Ticks>,
 }
 
 /// What the user wants now.
@@ -38,19 +40,29 @@ impl Pauses {
             return Some(Wanted::Resume);
         }
         let (_, lasts) = self.coming.pop_if(|(at, _)| *at <= now)?;
-        (self.asked, self.since) = (Some(lasts), Some(now));
+        (self.asked, self.since, self.awaited) = (Some(lasts), Some(now), Some(now));
         Some(Wanted::Pause)
+    }
+
+    /// There is nothing to be paused, or it is already.
+    pub(super) const fn is_refused(&mut self) {
+        (self.asked, self.since, self.awaited) = (None, None, None);
+    }
+
+    /// Whether one was accepted before `until` and never came.
+    pub(super) fn is_forgotten(&self, until: Ticks) -> bool {
+        self.awaited.is_some_and(|at| at < until)
     }
 
     /// The print is paused: it is resumed at once, unless it is the user's pause.
     pub(super) fn is_paused(&mut self, now: Ticks) {
-        self.since = None;
+        (self.since, self.awaited) = (None, None);
         self.resume_at = Some(now + self.asked.take().unwrap_or_default());
     }
 
     /// The host is gone, and with it the pause that it was in: who takes the print up says anew how it is.
     pub(super) const fn host_is_gone(&mut self) {
-        (self.asked, self.resume_at, self.since) = (None, None, None);
+        (self.asked, self.resume_at, self.since, self.awaited) = (None, None, None, None);
     }
 
     /// When something is due next.
@@ -78,6 +90,11 @@ mod tests {
         pauses.is_paused(Ticks(180));
         pauses.host_is_gone();
         assert_eq!((pauses.take(Ticks(999)), pauses.next()), (None, None));
+        let mut forgotten = Pauses::new(&[pause(1.0, 2.0)], Ticks(100), Hertz(10));
+        assert_eq!(forgotten.take(Ticks(110)), Some(Wanted::Pause));
+        assert!(forgotten.is_forgotten(Ticks(111)) && !forgotten.is_forgotten(Ticks(110)));
+        forgotten.is_refused();
+        assert!(!forgotten.is_forgotten(Ticks(111)));
         // One in the file.
         pauses.is_paused(Ticks(200));
         assert_eq!(pauses.take(Ticks(200)), Some(Wanted::Resume));

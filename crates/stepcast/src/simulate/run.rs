@@ -1,9 +1,9 @@
 //! The loop between a session and the virtual printer, in virtual time.
-//!
-//! The host's clock and the board's are not the same: the host's starts anywhere, and the board's crystal is a little off,
-//! so that the session has to find out both.
 
-use std::{collections::BTreeMap, time::Instant};
+mod reckoning;
+mod user;
+
+use std::time::Instant;
 
 use printer::{
     config::PrinterConfig,
@@ -13,34 +13,27 @@ use printer::{
     session::{JobOptions, JobStatus, Request, Session},
 };
 use units::{Celsius, Hertz, Seconds, Ticks};
-use virtual_printer::{BoardProfile, Faults, HeaterView, HostStall, State, VirtualPrinter};
+use virtual_printer::{BoardProfile, Faults, HeaterView, HostStall, VirtualPrinter};
 
 use super::{
     course::Course,
+    host_clock::HostClock,
     lease_tap::LeaseTap,
     observer::{Observer, Wish},
-    own_error,
-    pauses::{Pauses, Wanted},
-    report::{After, Motor, Outcome, Report},
+    pauses::Pauses,
+    report::After,
     tally::Tally,
 };
-use crate::{
-    console::{ErrorReport, Progress},
-    input::Input,
-};
+use crate::{console::Progress, input::Input};
 
-/// The host's clock when the board's starts.
-const HOST_START: Seconds = Seconds(4321.0);
-/// How much faster than it says the board's clock runs, as crystals do.
-const CRYSTAL_ERROR: f64 = 30e-6;
 /// The session is called again after this time at the earliest, whatever it asks for.
 const WAKE_MIN: Seconds = Seconds(50e-6);
 /// After the end the machine is watched for so long: long enough for the board's own watch over its heaters.
 pub(super) const AFTER: Seconds = Seconds(6.0);
 /// A print in which nothing happens for so long is given up.
 const STALL_MAX: Seconds = Seconds(6.0 * 3600.0);
-/// A pause rests so much later than its ramp at most.
-const PAUSE_SPARE: Seconds = Seconds(0.2);
+/// A pause that is asked for so shortly before the print's end need not come.
+const PAUSE_COMES: Seconds = Seconds(1.0);
 /// How often the nozzle's temperature is looked at.
 const SAMPLE_INTERVAL: Seconds = Seconds(0.1);
 /// The nozzle counts as extruding for so long after a step of the extruder's.
@@ -51,28 +44,6 @@ pub(crate) const PATH_ERROR_MAX_MM: f64 = 0.02;
 const STANDBY_BAND_C: f64 = 5.0;
 /// The progress bar is drawn this often, in rounds of the loop.
 const ROUNDS_PER_DRAW: u32 = 256;
-
-/// The host's clock, as the board's tells it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct HostClock {
-    start: Ticks,
-    ticks_per_s: f64,
-}
-
-impl HostClock {
-    pub(crate) fn new(start: Ticks, clock: Hertz) -> Self {
-        Self { start, ticks_per_s: f64::from(clock.0) * (1.0 + CRYSTAL_ERROR) }
-    }
-
-    pub(crate) fn at(self, now: Ticks) -> Seconds {
-        Seconds(HOST_START.0 + now.saturating_sub(self.start).0 as f64 / self.ticks_per_s)
-    }
-
-    /// The first tick at or after a time.
-    pub(crate) fn ticks_at(self, time: Seconds) -> Ticks {
-        Ticks(self.start.0 + ((time - HOST_START).0 * self.ticks_per_s).ceil().max(0.0) as u64)
-    }
-}
 
 /// How far the simulation is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,6 +111,8 @@ pub(crate) struct Aftermath {
     /// ramp and a little.
     pub(crate) pause_rest: Option<Ticks>,
     pub(crate) pause_is_late: bool,
+    /// A pause was accepted and never came.
+    pub(crate) pause_is_forgotten: bool,
     /// The end of the job, before the machine was watched.
     pub(crate) ended: Ticks,
     /// The pulses that came while no line was being executed.
@@ -399,58 +372,11 @@ impl Simulation {
         None
     }
 
-    /// The user says yes to what is held, once that is due.
-    fn consent(&mut self, now: Seconds) -> bool {
-        if self.consent_at.take_if(|at| *at <= self.printer.now()).is_none() {
-            return false;
-        }
-        self.aftermath.restarts += u32::from(self.printer.recorder().last_step != self.held_at);
-        if let Err(error) = self.session.request(Request::Resume, now) {
-            self.observer.error.get_or_insert(error);
-            self.end();
-        }
-        true
-    }
-
-    /// The user says yes to a print that begins in the middle of its file, once Z is homed.
-    fn set_out(&mut self, now: Seconds) -> bool {
-        let is_homed = self.session.position().is_some_and(|(_, homed)| homed[2]);
-        if !self.homes || !is_homed {
-            return false;
-        }
-        // It is refused until the axis is at rest.
-        self.homes = self.session.request(Request::Resume, now).is_err();
-        !self.homes
-    }
-
-    /// Notes how long a pause took to come to rest, where it has.
-    fn note_rest(&mut self) {
-        let is_aside = self.observer.is_aside();
-        let Some(asked) = self.pauses.since.take_if(|_| is_aside) else { return };
-        let took = self.printer.recorder().last_step.unwrap_or_default().saturating_sub(asked);
-        self.aftermath.pause_rest = self.aftermath.pause_rest.max(Some(took));
-        self.aftermath.pause_is_late |= took > self.lease.hold_ramp() + self.ticks(PAUSE_SPARE);
-    }
-
-    /// The user pauses the print, or resumes it, where that is due.
-    fn pause(&mut self, now: Seconds) -> bool {
-        let Some(wanted) = self.pauses.take(self.printer.now()) else { return false };
-        let result = match wanted {
-            // There may be nothing to be paused.
-            Wanted::Pause => self.session.request(Request::Pause, now).or(Ok(())),
-            Wanted::Resume if self.stage != Stage::Printing => Ok(()),
-            Wanted::Resume => self.session.request(Request::Resume, now),
-        };
-        if let Err(error) = result {
-            self.observer.error.get_or_insert(error);
-            self.end();
-        }
-        true
-    }
-
     fn end(&mut self) {
         if !matches!(self.stage, Stage::Watching(_)) {
             self.aftermath.ended = self.printer.now();
+            let before = self.aftermath.ended.saturating_sub(self.ticks(PAUSE_COMES));
+            self.aftermath.pause_is_forgotten = self.pauses.is_forgotten(before);
             self.stage = Stage::Watching(self.printer.now() + self.ticks(self.watched));
         }
     }
@@ -564,77 +490,6 @@ impl Simulation {
         progress.set(self.job.position());
         progress.say(format!("line {}, {:.0} s", self.observer.line, self.virtual_time().0));
     }
-
-    /// How it ended, as the machine saw it.
-    pub(crate) fn aftermath(&self) -> Aftermath {
-        let tally = self.printer.recorder();
-        Aftermath {
-            began: self.observer.began,
-            lease_rest: self.lease.rest(),
-            last_step: tally.last_step,
-            strays: tally.path.strays().0,
-            ..self.aftermath
-        }
-    }
-
-    /// What came of it.
-    pub(crate) fn into_report(mut self) -> Report {
-        let virtual_time = self.virtual_time();
-        let now = self.printer.now();
-        self.observer.finish();
-        let state = self.printer.state();
-        let profile_name = self.printer.profile().name;
-        let motion_now = self.printer.motion_now();
-        let tally = self.printer.recorder_mut();
-        if self.observer.done {
-            tally.path.finish();
-        } else if state.shutdown.is_none() {
-            tally.path.settle(motion_now);
-        }
-        let still = tally.last_step.is_none_or(|at| at + Ticks(1) < now);
-        self.after = After {
-            heaters_off: state.heaters.iter().all(|heater| heater.duty == 0.0),
-            motors_still: still,
-            shutdown: state.shutdown.map(|reason| reason.text().to_owned()),
-        };
-        let motors = motors(&self.observer, tally, &state);
-        let overdue = self.is_overdue.then(|| own_error("no-end", "it was given up: it did not end in time"));
-        let error = overdue.or_else(|| self.observer.session_error()).or_else(|| {
-            wrong(&self.observer, tally, &motors, self.path_error_max_mm)
-                .map(|found| own_error("wrong-pulses", found))
-        });
-        let worst = tally.path.worst();
-        let stats = self.session.link_stats().unwrap_or_default();
-        Report {
-            result: if error.is_none() { Outcome::Done } else { Outcome::Failed },
-            reason: error.as_ref().map(|error: &ErrorReport| error.what_happened.clone()),
-            error,
-            blocking_lines: Vec::new(),
-            board: profile_name,
-            seed: self.seed,
-            print_time_s: self.observer.print_time.0,
-            virtual_time_s: virtual_time.0,
-            speed_ratio: if self.wall_s > 0.0 { virtual_time.0 / self.wall_s } else { 0.0 },
-            moves: self.observer.moves,
-            path_error_max_mm: worst.distance_mm,
-            path_error_line: (worst.line > 0).then_some(worst.line),
-            filament_error_max_mm: tally.path.filament_worst_mm(),
-            temperature_error_max_c: self.observer.nozzle.error_max().map(|error| error.0),
-            temperature_overshoot_max_c: self.observer.nozzle.overshoot_max().0,
-            sent_bytes: stats.bytes_sent,
-            retransmitted_bytes: stats.bytes_retransmitted,
-            damaged_bytes: state.damaged_bytes,
-            min_queued_s: self.observer.min_queued.map(|ahead| ahead.0),
-            pulse_digest: tally.digest.text(),
-            step_digest: tally.digest.step_text(),
-            homing: std::mem::take(&mut self.observer.homing),
-            pauses: self.observer.pauses,
-            holds: self.observer.holds,
-            after: self.after,
-            course: self.course.finish(virtual_time, self.journal.len()),
-            motors,
-        }
-    }
 }
 
 /// From and until when the host is held up; soonest last.
@@ -646,61 +501,4 @@ fn stalls(stalls: &[HostStall], start: Ticks, clock: Hertz) -> Vec<(Ticks, Ticks
     let mut spans: Vec<_> = stalls.iter().map(span).collect();
     spans.sort_by_key(|&(from, _)| core::cmp::Reverse(from));
     spans
-}
-
-fn motors(observer: &Observer, tally: &Tally, state: &State) -> BTreeMap<&'static str, Motor> {
-    let of = |motor: usize| Motor {
-        planned_steps: observer.planned[motor],
-        counted_steps: tally.pulses[motor],
-        lost_steps: state.motors.get(motor).map_or(0, |view| view.lost.0),
-        end_position_mm: tally.path.position_mm(motor),
-    };
-    MOTOR_NAMES.iter().enumerate().map(|(motor, &name)| (name, of(motor))).collect()
-}
-
-/// What is wrong with the pulses of a print that the session takes for done.
-fn wrong(
-    observer: &Observer,
-    tally: &Tally,
-    motors: &BTreeMap<&'static str, Motor>,
-    path_error_max_mm: f64,
-) -> Option<String> {
-    if let Some(mismatch) = &observer.mismatch {
-        return Some(mismatch.clone());
-    }
-    for (name, motor) in motors {
-        let Motor { planned_steps, counted_steps, lost_steps, .. } = motor;
-        if planned_steps != counted_steps {
-            return Some(format!(
-                "{name}: {planned_steps} steps were planned, {counted_steps} pulses were counted"
-            ));
-        }
-        if *lost_steps != 0 {
-            return Some(format!("{name} lost {lost_steps} steps: it was driven harder than it can"));
-        }
-    }
-    let worst = tally.path.worst();
-    if worst.distance_mm > path_error_max_mm {
-        let (distance, line) = (worst.distance_mm, worst.line);
-        return Some(format!("the path strays by {distance:.3} mm from line {line}"));
-    }
-    let (strays, _) = tally.path.strays();
-    (strays > 0).then(|| format!("{strays} pulses came while no line was being executed"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn host_time_and_ticks_agree() {
-        let clock = HostClock::new(Ticks(1 << 32), Hertz(12_000_000));
-        assert_eq!(clock.at(Ticks(1 << 32)), HOST_START);
-        for ticks in [1u64, 17, 12_000_000, 75_000_000_000] {
-            let at = Ticks((1 << 32) + ticks);
-            let back = clock.ticks_at(clock.at(at));
-            assert!(back.0.abs_diff(at.0) <= 1, "{ticks}");
-        }
-        assert_eq!(clock.ticks_at(Seconds(0.0)), Ticks(1 << 32));
-    }
 }

@@ -10,6 +10,8 @@ mod rig;
 mod tests;
 mod trace;
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use printer::config::PrinterConfig;
 use units::{Mm, MmPerS, Seconds};
 use virtual_printer::BoardProfile;
@@ -34,6 +36,8 @@ const SAG_MM: f64 = 0.5;
 const MEASURED_MM: f64 = 0.04;
 /// X and Y are as exact as they are homed: no faster than so, in mm/s.
 const SECOND_HOMING: MmPerS = MmPerS(5.0);
+/// The filament of a line may be off by so many steps: where its ends lie between two steps is not the same.
+const FILAMENT_STEPS_OFF_MAX: i64 = 3;
 /// In so many prints the host has the same power.
 const HOST_DIES_PART: f64 = 0.5;
 
@@ -79,6 +83,31 @@ impl Loss {
     }
 }
 
+/// The clean print.
+struct Clean {
+    laid: Laid,
+    /// The steps of filament that each line was given.
+    filament: BTreeMap<u32, i64>,
+}
+
+impl Clean {
+    /// Whether the lines from there on were given another amount of filament.
+    fn misfed(&self, again: &BTreeMap<u32, i64>, from: u32) -> Option<String> {
+        let (mut all, mut worst) = (0, (0, 0));
+        let lines: BTreeSet<u32> = self.filament.keys().chain(again.keys()).copied().collect();
+        for &line in lines.range(from..) {
+            let [clean, again] = [&self.filament, again].map(|of| of.get(&line).copied().unwrap_or_default());
+            let off = again - clean;
+            all += off;
+            worst = if off.abs() > worst.1 { (line, off.abs()) } else { worst };
+        }
+        let is_off = all.abs() > FILAMENT_STEPS_OFF_MAX || worst.1 > FILAMENT_STEPS_OFF_MAX;
+        is_off.then(|| {
+            format!("line {} was given {} steps of filament more or less, all {all}", worst.0, worst.1)
+        })
+    }
+}
+
 /// A print that lost its power, judged.
 pub(super) struct Judged {
     pub(super) finding: Finding,
@@ -99,12 +128,12 @@ pub(super) fn run(
     }
     let mut clean = Rig::new(config.clone(), board, window.gcode.clone(), None, seed)?;
     clean.print()?;
-    let (ended, way) = (clean.age(), clean.way());
+    let (ended, filament, way) = (clean.age(), clean.filament(), clean.way());
     let first = way.iter().find(|(_, doing)| matches!(doing, Doing::Line { .. }));
     let first = first.map_or(clean.printer.start(), |(sample, _)| sample.at);
     let began = board.clock.duration_of(first.saturating_sub(clean.printer.start()));
     let loss = Loss::new(began, ended, chance);
-    let clean = Laid::of(&way);
+    let clean = Clean { laid: Laid::of(&way), filament };
     let about = loss.text();
     let finding = interrupted(&config, window, board, seed, &loss, &clean)
         .unwrap_or_else(|error| Finding { broken: vec![format!("{error:#}")], ..Finding::default() });
@@ -118,33 +147,40 @@ fn interrupted(
     board: &BoardProfile,
     seed: u64,
     loss: &Loss,
-    clean: &Laid,
+    clean: &Clean,
 ) -> anyhow::Result<Finding> {
     let mut rig = Rig::new(config.clone(), board, window.gcode.clone(), Some(loss), seed)?;
     rig.print()?;
+    rig.filament();
     let before = rig.way();
     let Some(gone_on) = rig.go_on(loss)? else { return Ok(Finding::default()) };
-    let after = rig.way();
+    let (filament, after) = (rig.filament(), rig.way());
 
     let mut broken = gone_on.broken;
     let mut heights = Heights::default();
     heights.follow(&before, 0);
     let (depth_mm, times) = heights.follow(&after, gone_on.found.reach_line);
     if times > 0 {
-        broken.push(format!("the nozzle went through the part {times} times, {depth_mm:.3} mm deep"));
+        broken.push(format!(
+            "the nozzle went through the part or the bed {times} times, {depth_mm:.3} mm deep"
+        ));
     }
     let [laid, again] = [&before, &after].map(|way| Laid::of(way));
-    let off = again.off(clean);
+    let off = again.off(&clean.laid);
     if off.xy_mm > OFF_MAX_MM || off.z_mm > OFF_MAX_MM || off.strays > 0 {
         broken.push(format!("what was laid again is off: {off:?}"));
     }
     // Whatever line it began with, all of the clean print is there.
-    let [_, behind] = clean.clone().split(gone_on.found.start_line);
-    let missing = [clean.off(&laid.and(&again)), behind.off(&again)];
+    let [_, behind] = clean.laid.clone().split(gone_on.found.start_line);
+    let missing = [clean.laid.off(&laid.and(&again)), behind.off(&again)];
     for missing in missing {
         if missing.xy_mm > OFF_MAX_MM || missing.strays > 0 {
             broken.push(format!("something is missing: {missing:?}"));
         }
+    }
+    broken.extend(clean.misfed(&filament, gone_on.found.start_line));
+    if config.extruder.as_ref().is_some_and(|extruder| rig.coldest < extruder.heater.min_extrude_temp) {
+        broken.push(format!("filament was pushed through a nozzle of {:.0} °C", rig.coldest.0));
     }
     let mut lost_steps = 0;
     for (motor, lost) in rig.lost_steps().into_iter().filter(|(_, lost)| *lost > 0) {
@@ -158,6 +194,7 @@ fn interrupted(
         lost_steps,
         path_error_mm: off.xy_mm.max(missing[0].xy_mm),
         z_error_mm: Some(gone_on.z_error_mm.map_or(off.z_mm, |error| off.z_mm.max(error.abs()))),
+        gone_on: 1,
         measured: u32::from(gone_on.z_error_mm.is_some()),
         broken,
         ..Finding::default()

@@ -11,6 +11,8 @@ use super::trace::{Doing, Sample};
 pub(super) const OFF_MAX_MM: f64 = 0.05;
 /// The nozzle may be so far below what is laid under it: it touches, it does not go through.
 const TOUCH_MM: f64 = 0.05;
+/// Straight down it may get onto what may have been laid above a line that is made twice: a layer, no more. In mm.
+const DOWN_MM: f64 = 0.4;
 /// What is laid is so wide to each side, and so is the nozzle's tip.
 const BEAD_MM: f64 = 0.2;
 /// The edge of the cells in which is noted how high the part is.
@@ -164,10 +166,10 @@ impl Heights {
         }
     }
 
-    /// How deep in the part a nozzle is there; not at all where it is not above 0.
+    /// How deep in the part or the bed a nozzle is there; not at all where it is not above 0.
     fn depth(&self, place: [f64; 3]) -> f64 {
         let heights = cells(place, BEAD_MM).filter_map(|at| self.0.get(&at));
-        heights.fold(0.0, |depth, height| f64::max(depth, height - place[2]))
+        heights.fold(f64::max(0.0, -place[2]), |depth, height| f64::max(depth, height - place[2]))
     }
 
     /// Follows a way: what it lays becomes part of the part, and where it goes across it must not be inside. How deep it
@@ -179,10 +181,13 @@ impl Heights {
         for (sample, doing) in way {
             let place = sample.place;
             let is_laid_again = matches!(*doing, Doing::Line { line, extrudes: true } if line <= twice);
-            if !is_laid_again && last.is_some_and(|last| last[..2] != place[..2]) {
+            let goes_across = last.is_some_and(|last| last[..2] != place[..2]);
+            let goes_down = last.is_some_and(|last| last[2] > place[2]);
+            if !is_laid_again && (goes_across || goes_down) {
                 let depth = self.depth(place);
+                let may = if goes_across { TOUCH_MM } else { DOWN_MM };
                 deepest = deepest.max(depth);
-                times += u64::from(depth > TOUCH_MM);
+                times += u64::from(depth > may);
             }
             last = Some(place);
             if matches!(doing, Doing::Line { extrudes: true, .. }) {
@@ -232,6 +237,20 @@ mod tests {
     }
 
     #[test]
+    fn a_way_straight_down_into_part_or_bed_is_found() {
+        let mut part = Heights::default();
+        part.follow(&square(1.0, 0.0, 0), 0);
+        let down = |x: f64, to: f64| {
+            let at = move |step: i32| [x, 10.0, to + f64::from(step) * 0.05];
+            (0..60).rev().map(move |step| (Sample { at: Ticks(0), place: at(step) }, Doing::Other))
+        };
+        for (x, to, times) in [(20.0, 0.7, 0), (20.0, 0.5, 2), (5.0, 0.0, 0), (5.0, -0.5, 2)] {
+            let (_, found) = part.follow(&down(x, to).collect::<Vec<_>>(), 0);
+            assert!(found.abs_diff(times) <= 1 && (found > 0) == (times > 0), "{x} {to}: {found}");
+        }
+    }
+
+    #[test]
     fn a_wrong_height_is_found() {
         let clean = Laid::of(&square(0.2, 0.0, 0));
         // Two full steps of the usual screw.
@@ -270,9 +289,9 @@ mod tests {
         // What is laid again may be below what was laid since, and nothing else.
         assert_eq!(heights.follow(&square(4.8, 0.0, 0), 13).1, 0);
         assert!(heights.follow(&square(4.8, 0.0, 0), 12).1 > 0);
-        // Up and down is no way across.
-        let hop: Vec<_> =
-            [5.0, 4.0, 5.0].map(|z| (Sample { at: Ticks(0), place: [10.0, 20.0, z] }, Doing::Other)).to_vec();
-        assert_eq!(heights.follow(&hop, 99).1, 0);
+        // Up out of what it stands in is no way through it.
+        let up: Vec<_> =
+            [4.0, 4.5, 5.0].map(|z| (Sample { at: Ticks(0), place: [10.0, 20.0, z] }, Doing::Other)).to_vec();
+        assert_eq!(heights.follow(&up, 99).1, 0);
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! Knows no judgement. Host time in s, the board's time in ticks.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use anyhow::Context;
 use printer::{
@@ -13,7 +13,7 @@ use printer::{
     journal::Journal,
     session::{Event, JobOptions, JobStatus, PhaseName, Request, Session},
 };
-use units::{Mm, MmPerS, Seconds, Ticks};
+use units::{Celsius, Mm, MmPerS, Seconds, Ticks};
 use virtual_printer::{BoardProfile, Failure, FailureKind, Faults, VirtualPrinter};
 
 use super::{
@@ -26,6 +26,8 @@ use crate::simulate::HostClock;
 const WAKE_MIN: Seconds = Seconds(50e-6);
 /// Anything takes no longer than this.
 const TIME_MAX: Seconds = Seconds(3600.0);
+/// The heater of the nozzle.
+const NOZZLE: &str = "extruder";
 /// Z.
 const Z: usize = 2;
 /// To measure Z, the user first has it go up by this much: then its motor has current.
@@ -51,6 +53,8 @@ pub(super) struct Rig {
     is_done: bool,
     error: Option<PrinterError>,
     to_host: Vec<u8>,
+    /// The coldest nozzle that filament was pushed through.
+    pub(super) coldest: Celsius,
 }
 
 /// How a print was gone on with.
@@ -99,6 +103,7 @@ impl Rig {
             is_done: false,
             error: None,
             to_host: Vec::new(),
+            coldest: Celsius(f64::INFINITY),
             printer,
         })
     }
@@ -137,7 +142,12 @@ impl Rig {
         let lives = self.host_dies.is_none_or(|dies| self.printer.now() < dies);
         let wake = if lives { self.attend() } else { until };
         let wake = self.clock.ticks_at(wake.min(until).max(self.now() + WAKE_MIN));
+        let pushes = self.printer.recorder().pushes;
         self.printer.run_until(wake, &mut self.to_host);
+        if self.printer.recorder().pushes > pushes {
+            let nozzle = self.printer.state().heaters.into_iter().find(|heater| heater.name == NOZZLE);
+            self.coldest = nozzle.map_or(self.coldest, |nozzle| self.coldest.min(nozzle.temperature));
+        }
         if lives && !self.to_host.is_empty() {
             let now = self.now();
             self.session.receive(&self.to_host, now);
@@ -217,6 +227,11 @@ impl Rig {
         })
     }
 
+    /// The steps of filament that each line was given so far; then that begins anew. To be asked for before the way.
+    pub(super) fn filament(&mut self) -> BTreeMap<u32, i64> {
+        self.printer.recorder_mut().take_filament()
+    }
+
     /// What was done so far; then that begins anew.
     pub(super) fn way(&mut self) -> Vec<(Sample, Doing)> {
         self.printer.recorder_mut().take()
@@ -249,7 +264,7 @@ impl Rig {
             broken.push("something moves or is warm before the user has said anything".to_owned());
         }
         let found = self.survey()?;
-        let lines = self.gcode.split(|&byte| byte == b'\n').filter(|line| !line.is_empty()).count();
+        let lines = self.gcode.split(|&byte| byte == b'\n').count();
         if found.start_line as usize > lines || found.start_line <= 1 {
             // There is nothing left of it, or nothing has been made.
             return Ok(None);

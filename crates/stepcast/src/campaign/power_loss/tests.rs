@@ -14,7 +14,7 @@ fn judged(loss: &Loss) -> Finding {
     let board = BoardProfile::rp2040();
     let mut clean = Rig::new(config.clone(), &board, gcode, None, 3).unwrap();
     clean.print().unwrap();
-    let clean = Laid::of(&clean.way());
+    let clean = Clean { filament: clean.filament(), laid: Laid::of(&clean.way()) };
     interrupted(&config, &window, &board, 3, loss, &clean).unwrap()
 }
 
@@ -33,6 +33,23 @@ fn loss() -> Loss {
         measured_off: Mm(0.02),
         claim_off: Mm(0.0),
     }
+}
+
+#[test]
+fn filament_that_is_missing_is_found() {
+    let filament = BTreeMap::from([(7, 100), (8, -50), (9, 200)]);
+    let clean = Clean { laid: Laid::of(&[]), filament: filament.clone() };
+    let with = |changes: &[(u32, i64)]| {
+        let mut again = filament.clone();
+        again.extend(changes.iter().copied());
+        clean.misfed(&again, 8)
+    };
+    assert_eq!(with(&[]), None);
+    // Before the line that it begins with, and where a step falls to the next line.
+    assert_eq!(with(&[(7, 0), (8, -51), (9, 201)]), None);
+    assert!(with(&[(9, 204)]).is_some());
+    assert!(with(&[(10, 5)]).is_some());
+    assert!(clean.misfed(&BTreeMap::new(), 8).is_some());
 }
 
 #[test]

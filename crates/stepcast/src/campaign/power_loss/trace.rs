@@ -3,6 +3,8 @@
 //! Knows pulses and which move is under way when; nothing of what anybody claims. Positions are those of the machine, in
 //! mm, which a loss of power does not move along with the claims.
 
+use std::collections::BTreeMap;
+
 use printer::{machine::EXTRUDER, session::ScheduledMove};
 use units::Ticks;
 use virtual_printer::Recorder;
@@ -45,8 +47,12 @@ pub(super) struct Trace {
     samples: Vec<Sample>,
     spans: Vec<Span>,
     behind: Ticks,
+    /// Pulses of the extruder, and whether they push.
+    filament: Vec<(Ticks, bool)>,
     /// Pulses of all motors.
     pub(super) pulses: u64,
+    /// Of these, those that push filament.
+    pub(super) pushes: u64,
 }
 
 impl Trace {
@@ -59,7 +65,9 @@ impl Trace {
             samples: Vec::new(),
             spans: Vec::new(),
             behind: Ticks(0),
+            filament: Vec::new(),
             pulses: 0,
+            pushes: 0,
         }
     }
 
@@ -70,6 +78,22 @@ impl Trace {
         let doing =
             if mv.line > 0 && !mv.homing { Doing::Line { line: mv.line, extrudes } } else { Doing::Other };
         self.spans.push(Span { start: clock_of(mv.start), end: clock_of(mv.end), doing });
+    }
+
+    /// How many steps of filament each line of the file was given so far; then that begins anew.
+    pub(super) fn take_filament(&mut self) -> BTreeMap<u32, i64> {
+        let mut steps = BTreeMap::new();
+        let mut next = self.spans.iter().peekable();
+        let mut present = None;
+        for (at, pushes) in core::mem::take(&mut self.filament) {
+            while let Some(span) = next.next_if(|span| span.start < at) {
+                present = Some(span.doing);
+            }
+            if let Some(Doing::Line { line, .. }) = present {
+                *steps.entry(line).or_default() += if pushes { 1 } else { -1 };
+            }
+        }
+        steps
     }
 
     /// All places so far, each with what was done; then both begin anew.
@@ -90,8 +114,12 @@ impl Trace {
 }
 
 impl Recorder for Trace {
-    fn step(&mut self, motor: usize, at: Ticks, _forward: bool, count: i64) {
+    fn step(&mut self, motor: usize, at: Ticks, forward: bool, count: i64) {
         self.pulses += 1;
+        if motor == EXTRUDER && self.filament.len() < SAMPLES_MAX {
+            self.pushes += u64::from(forward);
+            self.filament.push((at - self.behind, forward));
+        }
         let Some(&step_mm) = self.step_mm.get(motor) else { return };
         self.place[motor] = self.start_mm[motor] + count as f64 * step_mm;
         let far = |last: &Sample| {
