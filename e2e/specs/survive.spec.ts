@@ -166,6 +166,43 @@ test('a hot print: the board lowers its heat while it is alone, and gets it back
   await goOn({ printer, panel: again }, gcode);
 });
 
+test('paused, then the renderer is killed: another page takes it up as paused, and resumes it', async ({
+  bridge,
+  open,
+  watch,
+}) => {
+  test.setTimeout(180_000);
+  watch.expectError(/the page crashed/);
+  const { printer, panel } = await printing({ bridge, open });
+  await panel.job.getByRole('button', { name: 'Pause' }).click();
+  await expect(panel.status).toContainText('Paused');
+  await crash(panel.page);
+  await atRest(printer);
+  const again = await open();
+  await notices(again.page).getByRole('button', { name: 'Connect' }).click();
+  await again.connectIn(again.dialog('Connect'));
+  const dialog = again.page.getByRole('dialog', { name: 'A paused print' });
+  await expect(dialog).toContainText('the head is parked, or where it was moved to');
+  await expect(dialog).not.toContainText('rests on its path');
+  await expect(again.status).toContainText('Paused');
+  await expect(dialog.getByRole('button', { name: 'Cancel' })).toBeEnabled();
+  // Put away, it is a paused print like any other: the head can be moved.
+  await again.page.keyboard.press('Escape');
+  await expect(notices(again.page)).toContainText('A paused print.');
+  const still = pulses(printer);
+  await again.motion.getByRole('button', { name: 'Up 10 mm' }).click();
+  await expect.poll(() => pulses(printer)).not.toEqual(still);
+  await atRest(printer);
+  await notices(again.page).getByRole('button', { name: 'Show' }).click();
+  await dialog.getByRole('button', { name: 'Resume' }).click();
+  await expect(dialog).toHaveCount(0);
+  await expect(again.job).toContainText('The print is done.', { timeout: PRINT_TIMEOUT_MS });
+  const { motors, shutdown } = printer.state();
+  expect([shutdown, ...motors.map((motor) => motor.lost_steps)]).toEqual([null, 0, 0, 0, 0]);
+  await expect(notices(again.page)).not.toContainText('A paused print');
+  await expect.poll(() => stored(again.page), 'what has ended is not kept').toEqual([]);
+});
+
 test('a reload in the middle of the print: the same page takes it up again', async ({ bridge, open }) => {
   test.setTimeout(180_000);
   const { printer, panel } = await printing({ bridge, open });

@@ -165,12 +165,61 @@ async function goneOnWith(journal: string): Promise<{ first: PrintLog; second: P
 }
 
 test('the print that another goes on with is kept as long as its file is needed', async () => {
-  const { first, second } = await goneOnWith('15 16');
+  const { second } = await goneOnWith('15 16');
   expect(await archive.list(), 'both are under way').toEqual([]);
-  await archive.forget(first.id);
-  await archive.settle(second, 'over');
+  await archive.settle(second, 'done');
   expect(await store.listPrints()).toEqual([]);
   expect(locks.names.size).toBe(0);
+});
+
+test('what a continuation was given up for is kept for the board that may hold it, and offered to no other', async () => {
+  const { first, second } = await goneOnWith('15 16');
+  await archive.settle(second, 'over');
+  // Begun there it would run into what the other has printed.
+  expect(await archive.list()).toEqual([]);
+  expect((await store.listPrints()).map(({ id }) => id)).toEqual([first.id]);
+  const found = await archive.find(6);
+  if (!found) throw new Error('not found');
+  expect(await (await archive.openFile(found.print))?.text()).toBe('G28\n');
+  // Taken up and interrupted anew it is one like all others.
+  await interrupted(await archive.reopen(found, tell));
+  expect((await archive.list()).map(({ id }) => id)).toEqual([first.id]);
+  expect(locks.names.size).toBe(0);
+});
+
+test('the same where the page was gone before it could put the continuation away', async () => {
+  const { first, second } = await goneOnWith('15 16 -1');
+  await interrupted(second);
+  expect(await archive.list()).toEqual([]);
+  expect((await store.listPrints()).map(({ id }) => id)).toEqual([first.id]);
+  expect((await archive.find(6))?.print.id).toBe(first.id);
+});
+
+test('with a print goes all that it went on with: when it is done, and at the user\u2019s word', async () => {
+  for (const act of ['done', 'discard'] as const) {
+    const { second } = await goneOnWith('15 16');
+    await interrupted(second);
+    const third = await begun({ ...ABOUT, continues: second.id });
+    third.append('25 26');
+    if (act === 'done') await archive.settle(third, 'done');
+    else {
+      await interrupted(third);
+      expect((await archive.list()).map(({ id }) => id)).toEqual([third.id]);
+      expect(await store.listPrints()).toHaveLength(3);
+      await archive.discard(third.id);
+    }
+    expect(await store.listPrints(), act).toEqual([]);
+  }
+});
+
+test('records that go on with each other in a circle are discarded all the same', async () => {
+  const { first, second } = await goneOnWith('15 16');
+  await interrupted(second);
+  const again = await store.openPrint(first.id);
+  await again.describe(Buffer.from(JSON.stringify({ ...ABOUT, continues: second.id })));
+  again.close();
+  await archive.discard(second.id);
+  expect(await store.listPrints()).toEqual([]);
 });
 
 test('a print that was to go on with another and got nowhere leaves it as it was', async () => {
@@ -181,7 +230,7 @@ test('a print that was to go on with another and got nowhere leaves it as it was
   expect((await archive.list()).map(({ id }) => id)).toEqual([first.id]);
 });
 
-test('what has got further takes the place of what it went on with, once it has the file itself', async () => {
+test('what has got further takes the place of what it went on with, which is kept for the board that may hold it', async () => {
   const { first, second } = await goneOnWith('15 16');
   await interrupted(second);
   expect((await archive.list()).map(({ id, startLine }) => [id, startLine])).toEqual([[second.id, 3]]);
@@ -193,7 +242,7 @@ test('what has got further takes the place of what it went on with, once it has 
   await expect.poll(() => store.openFile(second.id).then((copy) => copy.text(), String)).toBe('G28\n');
   await interrupted(again);
   expect((await archive.list()).map(({ id }) => id)).toEqual([second.id]);
-  expect((await store.listPrints()).map(({ id }) => id)).toEqual([second.id]);
+  expect((await archive.find(6))?.print.id).toBe(first.id);
 });
 
 test('the file of a kept print: its copy, or the very same from the user', async () => {

@@ -77,7 +77,9 @@ test('while a printer is connected nothing is offered; a board that holds nothin
   expect(shown()).toEqual([]);
   worker().say({ kind: 'held-print', held: null });
   worker().say({ kind: 'snapshot', snapshot: NOW });
-  expect(shown().map(({ text }) => text)).toEqual([expect.stringContaining('does not hold it any more')]);
+  expect(shown().map(({ text }) => text)).toEqual([
+    expect.stringContaining('This printer does not hold it. If another one does, connect that.'),
+  ]);
   expect(shown()[0]?.action?.text).toBe('Continue from a line…');
   // Nothing is offered beside a print that runs.
   worker().say({ kind: 'snapshot', snapshot: { ...NOW, job: 'printing' } });

@@ -7,11 +7,12 @@ import type {
   KeptFile,
   KeptPrint,
   Snapshot,
+  StartAt,
   ToMachine,
 } from '../src/machine/protocol';
 import type { Layer } from '../src/preview/protocol';
 import { lineAfter, lineOfLayer, nearestPlace, placeOf } from '../src/state/start';
-import { mm, seconds, share } from '../src/units';
+import { celsius, mm, seconds, share } from '../src/units';
 import { FakeSession } from './fake_session';
 import { type FakeWorker, fakeWorkers } from './fake_worker';
 
@@ -86,7 +87,13 @@ test('an interrupted print goes on behind what is known to be made', () => {
 });
 
 const NOW: Snapshot = { ...new FakeSession().snapshot(), wakeUps: { missed: 0, latest: seconds(0) } };
-const START = { line: 57, position: [mm(1), mm(2), mm(0.4)], clearZ: mm(2.4) } as const;
+const START: StartAt = {
+  line: 57,
+  position: [mm(1), mm(2), mm(0.4)],
+  clearZ: mm(2.4),
+  nozzle: celsius(210),
+  bed: celsius(60),
+};
 
 let page: typeof import('../src/state/machine');
 let start: typeof import('../src/state/start');

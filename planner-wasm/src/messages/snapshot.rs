@@ -130,11 +130,16 @@ pub struct StartView {
     pub position_mm: [f64; 3],
     /// The height over which the way there leads: above all that has been printed.
     pub clear_z_mm: f64,
+    /// What `resume` heats the nozzle to, 0 where it stays off.
+    pub nozzle_c: f64,
+    /// The same of the bed.
+    pub bed_c: f64,
 }
 
 impl From<PendingStart> for StartView {
     fn from(start: PendingStart) -> Self {
-        Self { line: start.line, position_mm: start.position, clear_z_mm: start.clear_z }
+        let PendingStart { line, position, clear_z, targets: [nozzle, bed] } = start;
+        Self { line, position_mm: position, clear_z_mm: clear_z, nozzle_c: nozzle.0, bed_c: bed.0 }
     }
 }
 

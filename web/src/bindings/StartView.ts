@@ -1,5 +1,5 @@
 // Generated from planner-wasm/src/messages by `cargo xtask bindings`. Do not edit.
-import type { Mm } from './units';
+import type { Mm, Celsius } from './units';
 
 /**
  * How a job begins that does not begin with its file.
@@ -16,4 +16,12 @@ position_mm: [Mm, Mm, Mm],
 /**
  * The height over which the way there leads: above all that has been printed.
  */
-clear_z_mm: Mm, };
+clear_z_mm: Mm, 
+/**
+ * What `resume` heats the nozzle to, 0 where it stays off.
+ */
+nozzle_c: Celsius, 
+/**
+ * The same of the bed.
+ */
+bed_c: Celsius, };

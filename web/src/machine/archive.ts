@@ -6,7 +6,7 @@ import type { PortId } from '../transport/web_serial';
 import type { Ending } from './machine';
 import { type KeptPrint, type PrintFacts, type PrintStart, type Trouble, WHOLE } from './protocol';
 import type { JournalSummary } from './session';
-import { type OpenPrint, type PrintStore, StorageError } from './storage';
+import { type OpenPrint, PRINTS_MAX, type PrintStore, StorageError } from './storage';
 import { copyMissing, otherFile, storageTrouble } from './troubles';
 
 /** Numbers from a print's own on belong to it. */
@@ -22,6 +22,8 @@ export interface About {
   readonly start: PrintStart;
   /** The interrupted print that it goes on with. */
   readonly continues: string | null;
+  /** Another print has gone on with it and was given up: it is offered no more, and kept for a board that may hold it. */
+  readonly isOvertaken?: boolean;
 }
 
 /** Who has which print open, among all tabs. */
@@ -63,6 +65,7 @@ export interface Found {
 interface Listed {
   readonly print: KeptPrint;
   readonly continues: string | null;
+  readonly isOvertaken: boolean;
 }
 
 const encoder = new TextEncoder();
@@ -232,44 +235,68 @@ export class Archive {
     log.copy(file, this.#store.hasRoomFor(file.size));
   }
 
-  /** A print is over for this page: what has come to its end is not kept, and neither is what has not got anywhere. */
+  /** A print is over for this page: what has come to its end is not kept, and neither is what has not got anywhere. What it
+   * went on with goes with one that is done; where it got nowhere, that can be gone on with again. */
   async settle(log: PrintLog, ending: Ending): Promise<void> {
     await log.close();
     const summary = await this.#summary(log.id);
     const hasBegun = summary !== null && summary.line > 0;
-    if (ending !== 'over' && !summary?.hasEnded && (ending === 'left' || hasBegun)) return;
-    await this.forget(log.id);
-    // What it went on with can be gone on with again where nothing came of it.
-    if (log.continues !== null && hasBegun) await this.forget(log.continues);
+    const isOver = ending === 'done' || ending === 'over' || summary?.hasEnded;
+    if (!isOver && (ending === 'left' || hasBegun)) return;
+    if (ending === 'done' && hasBegun) await this.discard(log.id);
+    else await this.#putAway(log.id, hasBegun ? log.continues : null);
+  }
+
+  /** Nothing more comes of it. What it had gone on with may still be held by a board, if that is another one. */
+  async #putAway(id: string, overtaken: string | null): Promise<void> {
+    if (overtaken !== null) await this.#overtake(overtaken);
+    await this.forget(id);
+  }
+
+  /** Begun where it was interrupted it would run into what has been printed since. */
+  async #overtake(id: string): Promise<void> {
+    try {
+      await this.#mark(id, { ...(await this.#about(id)), isOvertaken: true });
+    } catch {
+      // It is gone, or another tab has taken it up: that one knows better.
+    }
+  }
+
+  async #mark(id: string, about: About): Promise<void> {
+    const { open, letGo } = await this.#open(id, null);
+    try {
+      await open.describe(encoder.encode(JSON.stringify(about)));
+    } finally {
+      open.close();
+      letGo();
+    }
   }
 
   /** Prints that were interrupted, the newest first. Those that have ended are put away. Empty where nothing can be read. */
   async list(): Promise<readonly KeptPrint[]> {
     const found: Listed[] = [];
-    /** Prints that were gone on with, and got further by that. */
-    const overtaken = new Set<string>();
+    /** Prints that were gone on with and got further by that, and when that was last heard of. */
+    const overtaken = new Map<string, number>();
     try {
       const prints = await this.#store.listPrints();
       // Asked after that: whoever begins a print has its lock first.
       const busy = await this.#locks.held();
-      for (const { id, changed, journalBytes, fileBytes } of prints) {
+      for (const { id, changed, journalBytes } of prints) {
         if (busy.has(id)) continue;
         const summary = await this.#summary(id);
-        if (journalBytes === 0 || summary?.hasEnded) await this.forget(id);
-        else if (summary) {
-          // One that cannot be read does not hide the others.
-          const one = await this.#listed(id, summary, changed).catch(() => null);
-          if (!one) continue;
-          found.push(one);
-          if (one.continues === null || summary.line === 0) continue;
-          overtaken.add(one.continues);
-          if (fileBytes !== null && !busy.has(one.continues)) await this.forget(one.continues);
-        }
+        // One that cannot be read does not hide the others.
+        const one = summary && (await this.#listed(id, summary, changed).catch(() => null));
+        const hasGotFurther = one && summary.line > 0 ? one.continues : null;
+        if (one && hasGotFurther !== null) overtaken.set(hasGotFurther, one.print.heardOf);
+        if (journalBytes === 0 || summary?.hasEnded) await this.#putAway(id, hasGotFurther);
+        else if (one) found.push(one);
       }
     } catch {
       // Where nothing can be read nothing is offered; a print that begins says so.
     }
-    const left = found.filter(({ print }) => !overtaken.has(print.id));
+    const left = found.filter(
+      ({ print, isOvertaken }) => !isOvertaken && !((overtaken.get(print.id) ?? -1) >= print.heardOf),
+    );
     // One that never got anywhere says less than the one that it was to go on with.
     const isIdle = ({ print, continues }: Listed): boolean =>
       print.line === 0 && left.some((other) => other.print.id === continues);
@@ -277,11 +304,11 @@ export class Archive {
   }
 
   async #listed(id: string, { line, elapsed }: JournalSummary, changed: Date): Promise<Listed> {
-    const { facts, machine, port, fileBytes, start, continues } = await this.#about(id);
+    const { facts, machine, port, fileBytes, start, continues, isOvertaken = false } = await this.#about(id);
     const { line: startLine, confirmedLines } = start;
     const heardOf = changed.getTime();
     const print = { id, facts, machine, port, fileBytes, line, startLine, elapsed, confirmedLines, heardOf };
-    return { print, continues };
+    return { print, continues, isOvertaken };
   }
 
   async #about(id: string): Promise<About> {
@@ -338,10 +365,23 @@ export class Archive {
 
   /** Opens a record again, to be added to. Rejects where another tab has it. */
   async reopen({ print, number, readableBytes }: Found, tell: Tell): Promise<PrintLog> {
-    const { continues } = await this.#about(print.id);
+    const about = await this.#about(print.id);
+    const { continues } = about;
+    if (about.isOvertaken) await this.#mark(print.id, { ...about, isOvertaken: false });
     const opened = await this.#open(print.id, continues);
     opened.open.keepJournal(readableBytes);
     return new PrintLog(print.id, number, opened, tell, continues);
+  }
+
+  /** The print is done, or the user wants nothing of it kept: neither is what it went on with. */
+  async discard(id: string): Promise<void> {
+    // No longer than there can be prints: nobody says that what was written is no circle.
+    let next: string | null = id;
+    for (let count = 0; next !== null && count < PRINTS_MAX; count += 1) {
+      const about: About | null = await this.#about(next).catch(() => null);
+      await this.forget(next);
+      next = about?.continues ?? null;
+    }
   }
 
   async forget(id: string): Promise<void> {

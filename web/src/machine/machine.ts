@@ -33,8 +33,8 @@ const PIECES_MAX = 16;
 /** … and then again after this time. */
 const PIECES_EVERY = seconds(0.004);
 
-/** How a print ended for this page: by itself or at the user's word; with a board that has forgotten it; or it may go on. */
-export type Ending = 'over' | 'lost' | 'left';
+/** How a print ended for this page: whole; at the user's word; with a board that has forgotten it; or it may go on. */
+export type Ending = 'done' | 'over' | 'lost' | 'left';
 
 /** Who keeps prints, and follows what happens to them. */
 export interface Keeping {
@@ -151,7 +151,8 @@ export class Machine {
   #collect(): void {
     this.#keepJournal();
     for (const event of this.session.takeEvents()) {
-      if (event.kind === 'done' || event.kind === 'cancelled') this.#jobOver('over');
+      if (event.kind === 'done') this.#jobOver('done');
+      else if (event.kind === 'cancelled') this.#jobOver('over');
       else if (event.kind === 'phase') this.#onPhase(event.phase);
       this.#push(event);
     }

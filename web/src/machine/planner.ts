@@ -182,6 +182,8 @@ function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
       line: now.job.start.line,
       position: point(now.job.start.position_mm),
       clearZ: mm(now.job.start.clear_z_mm),
+      nozzle: celsius(now.job.start.nozzle_c),
+      bed: celsius(now.job.start.bed_c),
     },
     line: now.job.line,
     elapsed: seconds(now.job.elapsed_s),

@@ -58,6 +58,9 @@ export interface StartAt {
   readonly position: readonly [Mm, Mm, Mm];
   /** The height over which the way there leads. */
   readonly clearZ: Mm;
+  /** What both are heated to for that, 0 where they stay off. */
+  readonly nozzle: Celsius;
+  readonly bed: Celsius;
 }
 
 /** How late the worker's timers were since the connection began. */

@@ -198,7 +198,7 @@ function tellKept(): void {
 }
 
 async function forget(id: string): Promise<void> {
-  if (planner) await archiveOf(planner).forget(id);
+  if (planner) await archiveOf(planner).discard(id);
   tellKept();
 }
 

@@ -1,6 +1,6 @@
 // The print that a board holds after its page was gone: what is known of it, how far it has been taken up, and the
 // user's word. Nothing here moves anything before that word.
-import { effect, signal } from '@preact/signals';
+import { computed, effect, signal } from '@preact/signals';
 import type { JSX } from 'preact';
 import type { HeldPrint, KeptPrint } from '../machine/protocol';
 import { timeOf } from '../state/interrupted';
@@ -51,6 +51,9 @@ async function resume(): Promise<void> {
   isUnderWay.value = false;
 }
 
+/** The print waits for the user's word: held on its path, or paused with its head parked. */
+const isWaiting = computed(() => job.value === 'held' || job.value === 'paused');
+
 /** How long it has been so, in words. */
 function since(ms: number): string {
   const seconds = Math.max(0, (Date.now() - ms) / 1000);
@@ -70,7 +73,7 @@ function Known({ print }: { readonly print: KeptPrint }): JSX.Element {
         {facts.time !== null && ` of ${formatDuration(facts.time)}`}
       </Fact>
       <Fact name="Last heard of">{timeOf(heardOf)}</Fact>
-      <Fact name="Held for">{since(heardOf)}</Fact>
+      <Fact name={job.value === 'paused' ? 'Paused for' : 'Held for'}>{since(heardOf)}</Fact>
       {snapshot.value?.heaters.map(({ name, temperature, target, isStandby }) => (
         <Fact key={name} name={HEATERS[name]}>
           {formatNumber(temperature, 1)} °C{target > 0 && ` of ${formatNumber(target)}`}
@@ -157,13 +160,17 @@ function Body({ held }: { readonly held: HeldPrint }): JSX.Element {
       return (
         <>
           <p>
-            The page that printed this is gone, and the board held the print: the head rests on its path, with
-            no step lost. Look at the part first: does it still stick to the bed, is the nozzle free? Then
-            resume with the very next step, or end the print.
+            {job.value === 'paused'
+              ? 'The page that printed this is gone. The print was paused, and still is: the head is parked, or where it was moved to. No step is lost.'
+              : 'The page that printed this is gone, and the board held the print: the head rests on its path, with no step lost.'}{' '}
+            Look at the part first: does it still stick to the bed, is the nozzle free? Then resume
+            {job.value === 'paused' &&
+              ': what has cooled is heated, the head goes back, and the print goes on'}{' '}
+            with the very next step, or end the print.
           </p>
           <Known print={held.print} />
           <div class="dialog-foot">
-            <Button kind="danger" class="big" disabled={job.value !== 'held'} onClick={cancel}>
+            <Button kind="danger" class="big" disabled={!isWaiting.value} onClick={cancel}>
               Cancel
             </Button>
             <Button
@@ -171,7 +178,7 @@ function Body({ held }: { readonly held: HeldPrint }): JSX.Element {
               icon="play"
               class="big"
               busy={isUnderWay.value}
-              disabled={job.value !== 'held'}
+              disabled={!isWaiting.value}
               onClick={() => void resume()}
             >
               Resume
@@ -182,16 +189,16 @@ function Body({ held }: { readonly held: HeldPrint }): JSX.Element {
   }
 }
 
+/** Taken up, a print that was paused is nothing that the board holds any more. */
+const titleOf = ({ kind }: HeldPrint): string =>
+  kind === 'held' && job.value === 'paused' ? 'A paused print' : 'The board holds a print';
+
 /** Open as long as there is something to be decided, unless it is put away. */
 export function HeldDialog(): JSX.Element | null {
   const held = heldPrint.value;
   if (!held || isPutAway.value || isResumed.value) return null;
   return (
-    <Dialog
-      title="The board holds a print"
-      aside={<EmergencyStop />}
-      onClose={() => (isPutAway.value = true)}
-    >
+    <Dialog title={titleOf(held)} aside={<EmergencyStop />} onClose={() => (isPutAway.value = true)}>
       <div class="stack">
         <Body held={held} />
       </div>
@@ -203,9 +210,9 @@ export function HeldDialog(): JSX.Element | null {
 export function followHeld(): void {
   let hasGoneOn = false;
   effect(() => {
-    const [held, state] = [heldPrint.value?.kind === 'held', job.value];
-    if (held && isResumed.value && (state !== 'held' || !hasGoneOn)) {
-      hasGoneOn ||= state !== 'held';
+    const [held, waits] = [heldPrint.value?.kind === 'held', isWaiting.value];
+    if (held && isResumed.value && (!waits || !hasGoneOn)) {
+      hasGoneOn ||= !waits;
       return;
     }
     // Held anew, or no longer at all.
@@ -219,7 +226,7 @@ export function followHeld(): void {
     } else if (isPutAway.value)
       notify({
         kind: KIND,
-        text: 'The board holds a print.',
+        text: `${titleOf(heldPrint.value)}.`,
         isFixed: true,
         action: { text: 'Show', act: () => (isPutAway.value = false), why: null },
       });

@@ -244,8 +244,9 @@ function Body({ request }: { readonly request: StartRequest }): JSX.Element {
       return (
         <>
           <p>
-            The print was interrupted, and its board has forgotten it: after a loss of power, a restart or a
-            stop. It can go on from a line of its file.
+            The print was interrupted, and this printer does not hold it: its board forgets it with a loss of
+            power, a restart or a stop. Here it can go on from a line of its file. If another printer holds
+            it, close this and connect that: there it goes on with its next step.
           </p>
           <KnownOf lost={request.lost} at={request.at} />
           {request.trouble && <Said of={request.trouble} />}

@@ -2,7 +2,7 @@
 // part. Step by step, beside the controls for moving by hand; Resume waits for it.
 import { signal } from '@preact/signals';
 import type { ComponentChildren, JSX } from 'preact';
-import type { Interruption } from '../machine/protocol';
+import type { Interruption, StartAt } from '../machine/protocol';
 import { snapshot, wish } from '../state/machine';
 import {
   isPartThere,
@@ -65,35 +65,36 @@ interface WhereProps {
 /** What the file, the journal and the motor say of Z. */
 function WhereZWas({ at, typed }: WhereProps): JSX.Element {
   const { zRange, zPlaces, zPitch, zError } = at;
-  if (!zRange) return <p>Z was being moved by hand or homed when the print was interrupted: measure it.</p>;
+  if (!zRange) return <p>Z was being moved by hand or homed when the print was interrupted.</p>;
   const [low, high] = zRange;
   const was =
     high - low < NEAR_MM ? `at ${millimetres(low)}` : `between ${millimetres(low)} and ${millimetres(high)}`;
   if (zPlaces.length === 0)
     return (
       <p>
-        Z was {was}. It may stand up to {millimetres(zError)} from there now: measure it.
+        Z was {was}. It may stand up to {millimetres(zError)} from there now.
       </p>
     );
-  const isOne = zPlaces.length === 1;
+  const places =
+    zPlaces.length === 1
+      ? 'this place'
+      : `one of these places, ${millimetres(zPitch)} apart, the likeliest first`;
   const doubt = zError >= NEAR_MM ? `, give or take ${millimetres(zError)}` : '';
   return (
     <>
       <p>
-        Z was {was}. With current again its motor stands at{' '}
-        {isOne ? millimetres(zPlaces[0] ?? 0) : `one of these places, ${millimetres(zPitch)} apart`}
-        {doubt}, unless the head has sunk.
-        {!isOne && ' Choose one: the likeliest is first. If in doubt, measure.'}
+        Z was {was}. If board and motors lost their power together and got it back together, and the head has
+        not sunk, it stands at {places}
+        {doubt}. Not so if the board was only restarted, or had power from USB meanwhile. Choose, then check
+        with the paper.
       </p>
-      {!isOne && (
-        <Choice
-          label="Places where Z can stand"
-          hideLabel
-          choices={zPlaces.map((place, value) => ({ value, text: millimetres(place) }))}
-          value={zPlaces.findIndex((place) => typed !== null && Math.abs(place - typed) < NEAR_MM)}
-          onSet={(index) => type(zPlaces[index] ?? 0)}
-        />
-      )}
+      <Choice
+        label="Places where Z can stand"
+        hideLabel
+        choices={zPlaces.map((place, value) => ({ value, text: millimetres(place) }))}
+        value={zPlaces.findIndex((place) => typed !== null && Math.abs(place - typed) < NEAR_MM)}
+        onSet={(index) => type(zPlaces[index] ?? 0)}
+      />
     </>
   );
 }
@@ -130,7 +131,8 @@ function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
   const typed = typedZ.value?.of === begun ? typedZ.value.z : null;
   const value = Math.min(Math.max(typed ?? proposed, min), max);
   const base = placeNear(at, known);
-  const isSaid = known !== null || typed !== null || at?.zPlaces.length === 1;
+  // What the motor says is proposed, and claimed by nobody but the user.
+  const isSaid = known !== null || typed !== null;
   const say = async (): Promise<void> => {
     if (!(await wish({ kind: 'set-position', axis: 'Z', position: mm(value) }))) return;
     noteZ(begun, known, value);
@@ -141,14 +143,17 @@ function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
       {known === null ? (
         <p>Z cannot be homed with the part in the way: say where the nozzle is.</p>
       ) : (
-        <p>Taken to stand at {millimetres(known)}. Where that is not so, correct it.</p>
+        <p>
+          Taken to stand at {millimetres(known)}. Check it with a sheet of paper; where it is not so, correct
+          it.
+        </p>
       )}
-      {at && known === null && <WhereZWas at={at} typed={typed} />}
-      <p class="hint">
+      <p>
         To measure: say what is likely, then move Z under Motion until a sheet of paper just slides. On the
         bed, beside the part, that is {formatNumber(PAPER_MM, 1)} mm; on top of the part{' '}
         {millimetres(place.top + PAPER_MM)}. Then correct it here.
       </p>
+      {at && known === null && <WhereZWas at={at} typed={typed} />}
       <div class="row wrap end">
         <NumberField
           label="Z stands at"
@@ -162,7 +167,13 @@ function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
         />
         <Button
           kind={known === null ? 'primary' : 'plain'}
-          why={isSaid ? null : 'Type where Z stands first.'}
+          why={
+            isSaid
+              ? null
+              : at?.zPlaces.length
+                ? 'Type where Z stands, or choose a place.'
+                : 'Type where Z stands first.'
+          }
           onClick={() => void say()}
         >
           {known === null ? 'Z stands there' : 'Correct Z'}
@@ -190,6 +201,14 @@ function LookAtPart(): JSX.Element {
   );
 }
 
+/** What is heated up there, in words. */
+function heatedTo(start: StartAt | null): string {
+  const [nozzle, bed] = [start?.nozzle ?? 0, start?.bed ?? 0].map((target) => `${formatNumber(target)} °C`);
+  if (start && start.nozzle > 0)
+    return `the nozzle is heated to ${nozzle}${start.bed > 0 ? `, the bed to ${bed}` : ''}`;
+  return start && start.bed > 0 ? `the bed is heated to ${bed}` : 'nothing is heated';
+}
+
 /** The steps, while a print waits to begin; nothing otherwise. */
 export function StartSteps(): JSX.Element | null {
   const begun = starting.value;
@@ -211,7 +230,7 @@ export function StartSteps(): JSX.Element | null {
         Then press Resume: the nozzle gets warm enough to come free and goes up to{' '}
         {millimetres(start?.clearZ ?? 0)},{' '}
         {homes !== '' && `${homes} ${homes.length > 1 ? 'are' : 'is'} homed, `}
-        everything is heated, and it goes across, down, and on. Keep the way free.
+        {heatedTo(start)}, and it goes across, down, and on. Keep the way free.
       </p>
     </section>
   );

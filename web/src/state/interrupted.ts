@@ -46,7 +46,8 @@ export const endedBy = (device: KeptPrint['port'], config: string): readonly Kep
       port.vendor === device.vendor && port.product === device.product && machine.config !== config,
   );
 
-/** The board is ready, prints nothing and holds nothing: what was interrupted on it cannot go on any more. */
+/** The board is ready, prints nothing and holds nothing: what was interrupted on it cannot go on with its next step. All that
+ * is known is that it is such a board: another one of the kind may hold the print. */
 const lost = computed<readonly KeptPrint[]>(() => {
   const [choice, isFree] = [port.value, isReady.value && !isPrinting.value];
   if (!isFree || choice?.kind !== 'serial' || heldPrint.value) return [];
@@ -63,10 +64,13 @@ function tell(print: KeptPrint, isLost: boolean, connect: (print: KeptPrint) => 
   const forget = { text: 'Forget it', act: () => forgetPrint(print.id) };
   if (isLost) {
     const line = lineAfter(print);
-    const hope = line === null ? 'and nothing had been printed yet' : 'but it can go on from a line';
+    const hope =
+      line === null
+        ? 'nothing had been printed yet'
+        : 'it cannot go on with its next step, but it can from a line';
     return notify({
       kind,
-      text: `${happened} The board does not hold it any more: it cannot go on with its next step, ${hope}.`,
+      text: `${happened} This printer does not hold it. If another one does, connect that. If it was this one, ${hope}.`,
       ...(line !== null && {
         action: {
           text: 'Continue from a line…',

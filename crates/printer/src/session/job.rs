@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use gcode::Settings;
-use units::{MmPerS, Seconds, Ticks};
+use units::{Celsius, MmPerS, Seconds, Ticks};
 
 use super::stream::Cut;
 use crate::{
@@ -40,6 +40,8 @@ pub struct PendingStart {
     pub position: [f64; 3],
     /// The height over which the way there leads, in mm.
     pub clear_z: f64,
+    /// What nozzle and bed are heated to for that, 0 where they stay off.
+    pub targets: [Celsius; 2],
 }
 
 /// What a job is doing.
@@ -91,7 +93,7 @@ pub(super) struct Paused {
     /// The nozzle was hot enough.
     pub(super) could_extrude: bool,
     /// What the heaters were set to.
-    pub(super) targets: Vec<(gcode::Heater, units::Celsius)>,
+    pub(super) targets: Vec<(gcode::Heater, Celsius)>,
     /// Where it begins in the middle of its file.
     pub(super) start: Option<Start>,
     /// The motion clock of the rest, where motion was held for the pause.
@@ -152,6 +154,8 @@ pub(super) struct Job {
     pub(super) paused: Option<Paused>,
     /// Reads up to the line with which it begins.
     pub(super) skip: Option<Skip>,
+    /// The speed and flow factors that the user sets meanwhile: they come into force at that line.
+    pub(super) factors: [Option<f64>; 2],
     pub(super) told: Seconds,
     /// It has made a move.
     pub(super) has_moved: bool,
@@ -167,6 +171,7 @@ impl Job {
             state: JobState::Printing,
             paused: None,
             skip: None,
+            factors: [None; 2],
             told: Seconds(f64::NEG_INFINITY),
             has_moved: false,
             leaves_hot: false,

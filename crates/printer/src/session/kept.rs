@@ -69,6 +69,11 @@ impl Kept {
         self.fan = speed;
     }
 
+    /// What was to come of the fan does not.
+    pub(super) fn forget_fans(&mut self) {
+        self.fans.clear();
+    }
+
     /// Whether no more changes of the fan are taken.
     pub(super) fn is_full(&self) -> bool {
         self.fans.len() >= FANS_MAX

@@ -1,6 +1,6 @@
 //! What an owner may ask of a session, and when it is refused.
 
-use units::{Mm, Seconds};
+use units::{Celsius, Mm, Seconds};
 use wire::Command;
 
 use super::{
@@ -41,17 +41,14 @@ impl Session {
                 ready.diary.target(heater, target.0);
             }
             Request::SetFan(speed) => {
-                ready.thermal.set_fan(speed, None, &mut ready.board, now);
-                ready.stream.kept.set_fan(speed);
+                ready.set_fan_now(speed, now);
                 ready.diary.input(Input::Fan(speed));
             }
             Request::SetSpeedFactor(factor) => {
-                ready.sources().for_each(|source| source.interpreter.set_speed_factor(factor));
-                ready.diary.input(Input::Speed(factor));
+                ready.set_factor(Input::Speed(factor));
             }
             Request::SetFlowFactor(factor) => {
-                ready.sources().for_each(|source| source.interpreter.set_flow_factor(factor));
-                ready.diary.input(Input::Flow(factor));
+                ready.set_factor(Input::Flow(factor));
             }
             Request::SetPosition { axis, position } => ready.set_position(axis, position)?,
             Request::Pause => ready.pause(now)?,
@@ -180,7 +177,9 @@ impl Session {
         let paused = job.paused.as_ref()?;
         let Start { line, clear_z, .. } = paused.start?;
         let [x, y, z, _] = paused.position;
-        Some(PendingStart { line, position: [x, y, z], clear_z })
+        let targets = [gcode::Heater::Tool(0), gcode::Heater::Bed]
+            .map(|heater| ready.thermal.goal(heater, &paused.targets).max(Celsius::ZERO));
+        Some(PendingStart { line, position: [x, y, z], clear_z, targets })
     }
 
     /// How much motion the board has received and not yet made, in seconds. `None` where no run of motion is being
@@ -205,7 +204,11 @@ impl Session {
         match &self.stage {
             Stage::Ready(ready) => {
                 let source = ready.job.as_ref().map_or(&ready.console.source, |job| &job.source);
-                [source.interpreter.speed_factor(), source.interpreter.flow_factor()]
+                let [speed, flow] = ready.job.as_ref().map_or([None; 2], |job| job.factors);
+                [
+                    speed.unwrap_or_else(|| source.interpreter.speed_factor()),
+                    flow.unwrap_or_else(|| source.interpreter.flow_factor()),
+                ]
             }
             _ => [1.0, 1.0],
         }
@@ -254,6 +257,26 @@ impl Ready {
         self.note_height(self.planner.position()[2], MovedBy::Others);
         self.planner.correct(&mut self.console.source);
         Ok(())
+    }
+
+    /// A factor of what is planned from now on. What lines set that are passed over does not override it.
+    pub(in crate::session) fn set_factor(&mut self, input: Input) {
+        if let Some(job) = self.job.as_mut().filter(|job| job.state == JobState::Skipping) {
+            match input {
+                Input::Speed(factor) => job.factors[0] = Some(factor),
+                Input::Flow(factor) => job.factors[1] = Some(factor),
+                _ => {}
+            }
+            return;
+        }
+        for source in self.sources() {
+            match input {
+                Input::Speed(factor) => source.interpreter.set_speed_factor(factor),
+                Input::Flow(factor) => source.interpreter.set_flow_factor(factor),
+                _ => {}
+            }
+        }
+        self.diary.input(input);
     }
 
     fn sources(&mut self) -> impl Iterator<Item = &mut crate::planner::Source> {

@@ -1,6 +1,7 @@
 //! Whole sessions against the virtual printer: what is asked for happens, and whatever goes wrong ends with its own
 //! error and a machine that is safe.
 
+mod asked_again;
 mod attach;
 mod bench;
 mod console;

@@ -22,7 +22,7 @@ const RAMP: f64 = 0.3;
 const LATENCY_MAX: f64 = 0.2;
 
 /// A step of the print: the run of motion, ticks from its start, the motor, and which way.
-type Step = (usize, u64, usize, bool);
+pub(crate) type Step = (usize, u64, usize, bool);
 
 /// The motion clocks at which runs were cut off in a pause; homing breaks runs off too.
 fn cuts(bench: &Bench) -> Vec<u64> {
@@ -97,7 +97,7 @@ fn is_over(bench: &Bench) -> bool {
 /// Pauses, and waits until the head is parked, or the job has ended. Says how long motion took to rest, where it was cut
 /// off.
 #[track_caller]
-fn pause(bench: &mut Bench) -> Option<f64> {
+pub(crate) fn pause(bench: &mut Bench) -> Option<f64> {
     let (asked, pulses) = (bench.now(), bench.pulses().len());
     let before = cuts(bench).len();
     bench.ask(Request::Pause);
@@ -121,7 +121,7 @@ fn resume(bench: &mut Bench) {
     bench.until("going on", 60.0, |bench| bench.events.iter().filter(resumed).count() == wanted);
 }
 
-fn clean(setup: &Setup, file: &str) -> (Vec<Step>, f64) {
+pub(crate) fn clean(setup: &Setup, file: &str) -> (Vec<Step>, f64) {
     let (mut bench, from) = started(setup, file);
     let began = bench.age();
     bench.job_over();
@@ -130,7 +130,7 @@ fn clean(setup: &Setup, file: &str) -> (Vec<Step>, f64) {
 }
 
 #[track_caller]
-fn assert_whole(bench: &mut Bench, from: usize, expected: &[Step], what: &str) {
+pub(crate) fn assert_whole(bench: &mut Bench, from: usize, expected: &[Step], what: &str) {
     bench.job_over();
     bench.job_done();
     assert!(bench.state().motors.iter().all(|motor| motor.lost.0 == 0), "{what}");

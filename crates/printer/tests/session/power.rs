@@ -6,7 +6,7 @@ use printer::{
     journal::Journal,
     session::{Event, JobOptions, JobStatus, PhaseName, Request, ScheduledMove},
 };
-use units::Mm;
+use units::{Celsius, Mm};
 
 use crate::{
     bench::{Bench, Setup},
@@ -167,6 +167,11 @@ fn what_is_switched_off_on_the_way_is_asked_about() {
     let file = squares(2);
     let mut bench = Setup::default().ready();
     start(&mut bench, &file, 20);
+    // What it is going to be heated to is told before anything is heated.
+    let targets = |bench: &Bench| bench.session.pending_start().unwrap().targets;
+    assert_eq!(targets(&bench), [Celsius(70.0), Celsius(35.0)]);
+    bench.ask(Request::SetTemperature(gcode::Heater::Bed, Celsius(40.0)));
+    assert_eq!(targets(&bench), [Celsius(70.0), Celsius(40.0)]);
     bench.ask(Request::SetPosition { axis: 2, position: Mm(40.0) });
     bench.ask(Request::Resume);
     bench.until("homing", 60.0, |bench| bench.celsius(0) > 62.0);

@@ -27,7 +27,7 @@ fn moves(bench: &Bench) -> Vec<ScheduledMove> {
 }
 
 #[track_caller]
-fn paused(bench: &mut Bench, file: &str, line: u32) {
+pub(crate) fn paused(bench: &mut Bench, file: &str, line: u32) {
     bench.start_with(file, at_line(line)).unwrap();
     bench.until("the line", 20.0, |bench| bench.session.job_status() == JobStatus::Paused);
 }

@@ -8,7 +8,7 @@ use wire::Command;
 
 use super::{
     Ready,
-    hold::{Hold, Phase, Purpose, hold_error},
+    hold::{Hold, Phase, Purpose, Turned, hold_error},
 };
 use crate::{
     journal::MotorQueue,
@@ -27,12 +27,12 @@ use crate::{
 impl Ready {
     /// Has motion come to rest on its path, whatever holds it already; `false` where that cannot be, or nothing moves.
     pub(super) fn hold_motion(&mut self, purpose: Purpose, now: Seconds) -> bool {
-        let moves = matches!(purpose, Purpose::GoOn | Purpose::Parked)
+        let moves = matches!(purpose, Purpose::GoOn | Purpose::Back | Purpose::Parked)
             || self.stream.run().is_some_and(|run| !run.homing);
         if !moves || !self.board.layout.has_motion_clock {
             return false;
         }
-        let Some(hold) = &mut self.hold else {
+        let Some(mut hold) = self.hold.take() else {
             self.begin_hold(HoldReason::Asked);
             if let Some(hold) = &mut self.hold {
                 hold.purpose = purpose;
@@ -41,20 +41,28 @@ impl Ready {
             self.tell_hold(purpose);
             return true;
         };
+        let mut is_at_rest = false;
         match hold.phase {
-            Phase::Dropping { .. } | Phase::Leaving { .. } if purpose != Purpose::End => return false,
-            Phase::Resuming(Some(_)) => {
+            Phase::Dropping { .. } | Phase::Leaving { .. } if purpose != Purpose::End => {
+                self.hold = Some(hold);
+                return false;
+            }
+            Phase::Resuming(Some(told)) => {
                 hold.phase = Phase::Slowing;
-                hold.asked = Seconds(f64::NEG_INFINITY);
+                hold.asked = now;
+                hold.turned = Some(Turned { told, sent: None });
+                self.tell_hold(purpose);
             }
             Phase::AtRest | Phase::Heating | Phase::Resuming(None) => {
-                hold.purpose = purpose;
-                self.has_come_to_rest(now);
-                return true;
+                is_at_rest = true;
             }
             Phase::Slowing | Phase::Rejoining { .. } | Phase::Dropping { .. } | Phase::Leaving { .. } => {}
         }
         hold.purpose = purpose;
+        self.hold = Some(hold);
+        if is_at_rest {
+            self.has_come_to_rest(now);
+        }
         true
     }
 
@@ -64,11 +72,6 @@ impl Ready {
         let ramp = if purpose == Purpose::GoOn { RAMP_AT_REST } else { self.lease.ramp() };
         let ramp = self.board.ticks(ramp).0 as u32;
         self.board.control(&Command::MotionHold { ramp });
-    }
-
-    /// Whether motion is on its way to rest because this host wants it to be.
-    pub(super) fn is_holding(&self) -> bool {
-        self.hold.as_ref().is_some_and(Hold::is_wanted)
     }
 
     /// Whether nothing is to be planned: what was planned comes to rest on its path, or has been dropped.
@@ -84,12 +87,14 @@ impl Ready {
         hold.phase = Phase::AtRest;
         let can_go_on = self.job.as_ref().is_some_and(|job| job.paused.is_some() && !job.is_ending());
         match hold.purpose {
-            Purpose::Pause | Purpose::Parked if self.job.as_ref().is_some_and(Job::is_ending) => {
+            Purpose::Pause | Purpose::Back | Purpose::Parked
+                if self.job.as_ref().is_some_and(Job::is_ending) =>
+            {
                 self.cancel_held(now);
             }
             // What another host began is first made this one's own.
             Purpose::Pause if hold.rest.is_some() => hold.phase = hold.warm(now),
-            Purpose::Pause | Purpose::Parked => self.drop_queue(now),
+            Purpose::Pause | Purpose::Back | Purpose::Parked => self.drop_queue(now),
             Purpose::GoOn if can_go_on => {
                 hold.purpose = Purpose::Ask;
                 hold.phase = Phase::Resuming(None);
@@ -114,8 +119,15 @@ impl Ready {
         self.stand_at(counts, now);
         let cut = self.job.as_ref().and_then(|job| job.paused.as_ref()).and_then(|it| it.cut.as_ref());
         if let Some(fan) = cut.map(|cut| cut.left.fan) {
-            self.thermal.set_fan(fan, None, &mut self.board, now);
+            self.set_fan_now(fan, now);
         }
+    }
+
+    /// The way back of a paused job is broken off here.
+    pub(super) fn stand_on_the_way_back(&mut self, counts: &[i32; MOTORS], now: Seconds) {
+        let fan = self.thermal.fan_speed();
+        self.stand_at(counts, now);
+        self.set_fan_now(fan, now);
     }
 
     fn drop_queue(&mut self, now: Seconds) {
@@ -172,7 +184,8 @@ impl Ready {
         self.console.clear();
         self.planner.correct(&mut self.console.source);
         self.thermal.forget_fan_orders();
-        self.thermal.set_fan(0.0, None, &mut self.board, now);
+        self.stream.kept.forget_fans();
+        self.set_fan_now(0.0, now);
         self.lease.forget();
     }
 }

@@ -9,7 +9,7 @@ use crate::{
     planner::{ExtrusionPermit, Planner},
     session::{
         event::Event,
-        job::{Job, JobState, JobStatus, Paused, RETURN_FEED},
+        job::{Job, JobState, JobStatus, Paused, RETURN_FEED, Retracted},
     },
 };
 
@@ -41,7 +41,14 @@ impl Ready {
 
     fn switch_off(&mut self, now: Seconds) {
         self.thermal.all_off(&mut self.board, now);
-        self.thermal.set_fan(0.0, None, &mut self.board, now);
+        self.set_fan_now(0.0, now);
+    }
+
+    /// Sets the part fan, with no regard to what moves.
+    pub(in crate::session) fn set_fan_now(&mut self, speed: f64, now: Seconds) {
+        self.thermal.set_fan(speed, None, &mut self.board, now);
+        let speed = self.thermal.fan_speed();
+        self.stream.kept.set_fan(speed);
     }
 
     /// What was typed and not yet done is not done, and waits no longer.
@@ -56,6 +63,11 @@ impl Ready {
     /// Nothing is waited for any more; an axis that is being homed stops.
     fn stop_waiting(&mut self) {
         self.held = Held::default();
+        self.break_wait();
+    }
+
+    /// As [`Self::stop_waiting`]; what a paused job was waiting for still holds.
+    fn break_wait(&mut self) {
         match &mut self.wait {
             Wait::Homing { axis, remaining, .. } => {
                 remaining.clear();
@@ -67,7 +79,15 @@ impl Ready {
 
     pub(in crate::session) fn pause(&mut self, now: Seconds) -> Result<(), PrinterError> {
         let Some(job) = &self.job else { return Err(ErrorCode::NoJob.into()) };
-        if job.state != JobState::Printing {
+        match job.state {
+            JobState::Printing => {}
+            JobState::Returning => {
+                self.stop_returning(now);
+                return Ok(());
+            }
+            _ => return Ok(()),
+        }
+        if self.stop_heating_held() {
             return Ok(());
         }
         let is_held = self.hold_motion(Purpose::Pause, now);
@@ -78,6 +98,16 @@ impl Ready {
             job.state = if is_held { JobState::Halting } else { JobState::Pausing };
         }
         Ok(())
+    }
+
+    /// The way back of a paused job is broken off: it is paused where the head comes to rest.
+    fn stop_returning(&mut self, now: Seconds) {
+        self.break_wait();
+        let moves = self.stream.run().is_some_and(|run| !run.homing) || self.hold.is_some();
+        let is_held = moves && self.hold_motion(Purpose::Back, now);
+        if let Some(job) = self.job.as_mut().filter(|job| !job.is_ending()) {
+            job.state = if is_held { JobState::Halting } else { JobState::Parking };
+        }
     }
 
     /// What is waited for, or is about to be, waits until the job goes on.
@@ -155,8 +185,11 @@ impl Ready {
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
         }
         if let Some(retracted) = retracted {
-            let (e, speed) = self.primed(retracted);
-            self.planner.push_raw_move([x, y, z, e], speed, gcode::LineNumber(0))?;
+            let (from, speed) = self.primed(retracted);
+            self.planner.push_raw_move([x, y, z, from], speed, gcode::LineNumber(0))?;
+            if let Some(paused) = self.job.as_mut().and_then(|job| job.paused.as_mut()) {
+                paused.retracted = Some(Retracted { from, to: e });
+            }
         }
         Ok(())
     }
@@ -178,8 +211,8 @@ impl Ready {
         match state {
             Some(JobState::Pausing) => self.is_paused(now),
             Some(JobState::Parking) => self.is_parked(now),
-            // The board has yet to hold for it to go on.
-            Some(JobState::Returning) if self.is_holding() => {}
+            // The board has yet to hold for it to go on, or holds, and the user decides.
+            Some(JobState::Returning) if self.hold.is_some() => {}
             Some(JobState::Returning) => self.has_returned(now),
             Some(JobState::Cancelling) => self.end_job(Event::JobCancelled, now),
             Some(JobState::Failing(error)) => self.end_job(Event::Error(error), now),
@@ -225,12 +258,29 @@ impl Ready {
         self.events.push(Event::Paused);
     }
 
+    /// A nozzle that was hot enough in a print that is to go on is not any more: the user is asked again. Whether that is
+    /// so.
+    pub(super) fn is_too_cold_to_go_on(&mut self, now: Seconds) -> bool {
+        let paused = self.job.as_ref().and_then(|job| job.paused.as_ref());
+        let could_extrude = paused.is_some_and(|paused| paused.could_extrude);
+        if !could_extrude || self.extrusion_permit() == ExtrusionPermit::Allowed {
+            return false;
+        }
+        let text = "the nozzle was switched off while the print was about to go on: it is paused again";
+        self.events.push(Event::Message(text.into()));
+        self.is_parked(now);
+        true
+    }
+
     /// The machine is where the job was paused: its own planner goes on.
     fn has_returned(&mut self, now: Seconds) {
         match self.next_stretch() {
             Ok(true) => return,
             Ok(false) => {}
             Err(error) => return self.source_failed(error, now),
+        }
+        if self.is_too_cold_to_go_on(now) {
+            return;
         }
         self.note_height(self.planner.position()[2], MovedBy::File);
         let Some(job) = &mut self.job else { return };
@@ -244,7 +294,7 @@ impl Ready {
                 self.events.push(Event::RunResumed { broken, at: self.board.motion_at(now) });
             }
             if let Some(start) = paused.start {
-                self.thermal.set_fan(start.fan, None, &mut self.board, now);
+                self.set_fan_now(start.fan, now);
             }
         }
         let Held { wait, barrier } = core::mem::take(&mut self.held);

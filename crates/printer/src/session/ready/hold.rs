@@ -12,7 +12,7 @@ use super::{Failure, Ready, Wait, take_up::Rest};
 use crate::{
     error::{ErrorCode, PrinterError},
     journal::MotorQueue,
-    link::SCHEDULE_AHEAD_TICKS_MAX,
+    link::{Lane, SCHEDULE_AHEAD_TICKS_MAX},
     machine::MOTORS,
     planner::ExtrusionPermit,
     session::{
@@ -33,10 +33,6 @@ const RESUME_MAX: Seconds = Seconds(1.5);
 const COOLED_MAX_C: f64 = 10.0;
 /// Motion that is to go on is covered by this much more than what speeding up and coming to rest take.
 const COVER_SPARE: Seconds = Seconds(0.3);
-/// A pause between two calls that is worth telling.
-const GAP_MIN: Seconds = Seconds(0.5);
-/// After one so long, what was not heard of meanwhile is not silence.
-const GAP_LONG: Seconds = Seconds(3.0);
 
 /// How far a hold is.
 #[derive(Clone, Debug)]
@@ -66,6 +62,8 @@ pub(super) enum Purpose {
     Pause,
     /// … and goes on where it was.
     GoOn,
+    /// The job is put aside already: its way back is broken off.
+    Back,
     /// Another host has put the job aside: what that was doing with the head is broken off.
     Parked,
     /// What is being made is ended.
@@ -89,6 +87,17 @@ pub(super) struct Hold {
     pub(super) is_told: bool,
     /// What the board has to be given again, where another host began.
     pub(super) rest: Option<Box<Rest>>,
+    /// It was told to go on, and then to rest after all.
+    pub(super) turned: Option<Turned>,
+}
+
+/// The board was told to go on, and to hold again before it said that it does.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turned {
+    /// Its clock when it was told to go on: that it holds before that is no news …
+    pub(super) told: Ticks,
+    /// … nor is it before it has heard what was sent until then: that it is to hold.
+    pub(super) sent: Option<Seconds>,
 }
 
 impl Hold {
@@ -108,28 +117,12 @@ impl Hold {
     }
 }
 
-/// When the session was last called, and the longest pause since then that it has noticed.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Calls {
-    last: Option<Seconds>,
-    gap: Option<Seconds>,
-}
-
-impl Calls {
-    /// Notes a call. Whether it comes after a long pause.
-    pub(super) fn note(&mut self, now: Seconds) -> bool {
-        let gap = self.last.replace(now).map(|last| now - last).filter(|&gap| gap >= GAP_MIN);
-        self.gap = gap.or(self.gap);
-        gap.is_some_and(|gap| gap >= GAP_LONG)
-    }
-}
-
 impl Ready {
     /// What a hold makes of a job's status; nothing where there is none.
     pub(super) fn hold_status(&self) -> Option<JobStatus> {
         match self.hold.as_ref()?.phase {
             Phase::AtRest => Some(JobStatus::Held),
-            Phase::Dropping { .. } if self.hold.as_ref()?.purpose != Purpose::Pause => {
+            Phase::Dropping { .. } if matches!(self.hold.as_ref()?.purpose, Purpose::Ask | Purpose::End) => {
                 Some(JobStatus::Ending)
             }
             Phase::Dropping { .. }
@@ -166,17 +159,22 @@ impl Ready {
             },
             _ => {}
         }
+        let said_after = self.board.said_after;
         if let Some(hold) = &mut self.hold
             && at_rest
             && matches!(hold.phase, Phase::Slowing)
+            && hold.turned.is_none_or(|it| clock > it.told && it.sent.is_some_and(|sent| said_after > sent))
         {
+            hold.turned = None;
             if hold.purpose != Purpose::Ask {
                 return self.has_come_to_rest(now);
             }
             let motion_now = self.board.motion_at(now);
             let has_begun = self.stream.run().is_none_or(|run| motion_now > run.start);
-            if hold.reason == HoldReason::QueueDry && !has_begun {
-                // What covers the run did not get there in time for its begin: it only begins a little later.
+            let is_soon = self.calls.come_often();
+            if hold.reason == HoldReason::QueueDry && !has_begun && is_soon {
+                // What covers the run did not get there in time for its begin: it only begins a little later. Who has been
+                // away does not expect it to move now.
                 hold.phase = Phase::Resuming(None);
                 return;
             }
@@ -207,6 +205,7 @@ impl Ready {
             targets: rest.targets.clone(),
             is_told: false,
             rest: Some(Box::new(rest)),
+            turned: None,
         });
     }
 
@@ -221,6 +220,7 @@ impl Ready {
             targets: self.thermal.wanted(),
             is_told: false,
             rest: None,
+            turned: None,
         });
     }
 
@@ -237,13 +237,28 @@ impl Ready {
         }
         match hold.purpose {
             Purpose::Pause => self.park(now),
-            Purpose::Parked => self.is_parked(now),
+            Purpose::Back | Purpose::Parked => self.is_parked(now),
             Purpose::Ask | Purpose::GoOn | Purpose::End => {}
         }
     }
 
     fn nozzle(&self) -> Option<Celsius> {
         self.thermal.heater(gcode::Heater::Tool(0)).and_then(crate::heater::Heater::temperature)
+    }
+
+    /// What is held is not heated any longer before it goes on: the user is asked again, and the nozzle, which may stick to
+    /// the part, stays where it is. `false` where it was not.
+    pub(super) fn stop_heating_held(&mut self) -> bool {
+        let Some(hold) = self.hold.as_mut().filter(|hold| matches!(hold.phase, Phase::Heating)) else {
+            return false;
+        };
+        hold.phase = Phase::AtRest;
+        let error = match hold.rest {
+            Some(_) => ErrorCode::HeldForHost.into(),
+            None => hold_error(hold.reason, None),
+        };
+        self.events.push(Event::Held(error));
+        true
     }
 
     /// Goes on with what is held, with the very next step, once it is as warm as it was; `false` where nothing is held.
@@ -320,9 +335,15 @@ impl Ready {
             Phase::Slowing => {
                 if let Some(rest) = &mut hold.rest {
                     rest.stop(self.lease.ramp(), &mut self.board, now);
-                } else if hold.purpose != Purpose::Ask && now - hold.asked >= ASK_AGAIN {
-                    hold.asked = now;
-                    self.tell_hold(hold.purpose);
+                } else if hold.purpose != Purpose::Ask {
+                    let all_sent = self.board.link.waiting(Lane::Control) == 0;
+                    if let Some(turned) = hold.turned.as_mut().filter(|it| all_sent && it.sent.is_none()) {
+                        turned.sent = Some(now);
+                    }
+                    if now - hold.asked >= ASK_AGAIN {
+                        hold.asked = now;
+                        self.tell_hold(hold.purpose);
+                    }
                 }
             }
             Phase::Resuming(Some(_)) => {}
@@ -384,6 +405,8 @@ impl Ready {
                         self.put_aside(&queues, hold.targets.clone(), hold.could_extrude, now)?;
                     } else if hold.purpose == Purpose::Parked {
                         self.stand_parked(&queues.map(|queue| queue.position), now);
+                    } else if hold.purpose == Purpose::Back {
+                        self.stand_on_the_way_back(&queues.map(|queue| queue.position), now);
                     } else {
                         self.stand_at(&queues.map(|queue| queue.position), now);
                     }

@@ -3,6 +3,7 @@
 //! One thing at a time: G-code comes from the job or from the console, and a barrier in it (homing, a wait) is dealt
 //! with before anything that follows.
 
+mod calls;
 mod drop;
 mod ending;
 mod hold;
@@ -17,7 +18,8 @@ use gcode::LineNumber;
 use units::Seconds;
 
 use self::{
-    hold::{Calls, Hold},
+    calls::Calls,
+    hold::Hold,
     waiting::{Held, Wait},
 };
 use super::{
@@ -355,7 +357,7 @@ impl Ready {
                 if !self.plans_job() {
                     self.diary.input(Input::Fan(speed));
                 }
-                self.thermal.set_fan(speed, None, &mut self.board, now);
+                self.set_fan_now(speed, now);
             }
             TimedAction::Message(text) => self.events.push(Event::Message(text)),
             TimedAction::Annotation(annotation) => self.events.push(Event::Annotation(annotation)),

@@ -41,7 +41,7 @@ impl Ready {
         let position = match &cut {
             Some(cut) => {
                 self.thermal.forget_fan_orders();
-                self.thermal.set_fan(cut.left.fan, None, &mut self.board, now);
+                self.set_fan_now(cut.left.fan, now);
                 self.stream.position_of(counts, steps_mm, &self.board)
             }
             None => self.planner.position(),
@@ -96,8 +96,12 @@ impl Ready {
     fn plan_park(&mut self) -> Result<(), PrinterError> {
         let mut to = self.planner.position();
         let homed = self.planner.guard.homed();
-        let retracted =
-            self.job.as_ref().and_then(|job| job.paused.as_ref()).and_then(|paused| paused.retracted);
+        let Some(paused) = self.job.as_ref().and_then(|job| job.paused.as_ref()) else { return Ok(()) };
+        if paused.could_extrude && self.extrusion_permit() != ExtrusionPermit::Allowed {
+            // It sticks to the part.
+            return Ok(());
+        }
+        let retracted = paused.retracted;
         if let Some(retracted) = retracted {
             to[EXTRUDER] = retracted.to;
             let speed = self.config.firmware_retraction.as_ref().map(|it| it.retract_speed);
@@ -128,10 +132,14 @@ impl Ready {
         (e, speed.unwrap_or(RETRACT_SPEED))
     }
 
-    /// The head is parked.
+    /// The head is parked, or stands where its way back was broken off.
     pub(super) fn is_parked(&mut self, now: Seconds) {
+        let here = self.planner.position()[EXTRUDER];
         if let Some(job) = &mut self.job {
             job.state = JobState::Paused;
+            if let Some(retracted) = job.paused.as_mut().and_then(|paused| paused.retracted.as_mut()) {
+                retracted.to = here;
+            }
         }
         self.tell_paused(now);
     }

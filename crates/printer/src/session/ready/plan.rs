@@ -104,6 +104,7 @@ impl Ready {
                 let homing = matches!(self.wait, Wait::Homing { .. });
                 let run = self.stream.start_run(position, &self.board, now, homing);
                 self.lease.forget();
+                self.calls.run_planned();
                 if !homing && self.plans_job() {
                     self.note_height(position[2], MovedBy::File);
                     self.diary.run(run.start, &mut self.board);

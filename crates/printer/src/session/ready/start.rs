@@ -11,6 +11,7 @@ use units::{Celsius, MmPerS, Seconds};
 use super::{Ready, Wait};
 use crate::{
     error::{Ended, ErrorCode, PrinterError},
+    journal::Input,
     machine::EXTRUDER,
     planner::{ExtrusionPermit, Planner, Skip, Skipped},
     session::{
@@ -103,11 +104,20 @@ impl Ready {
                     job.leaves_hot = job.paused.as_ref().is_some_and(|paused| paused.could_extrude);
                     job.skip = None;
                 }
+                self.adopt_factors();
                 let text = format!("line {} is the next; say where Z stands, then resume", line.0);
                 self.events.push(Event::Message(text));
                 self.events.push(Event::Paused);
             }
             Err(error) => self.source_failed(error, now),
+        }
+    }
+
+    /// What the user has set while lines were passed over holds from here on.
+    fn adopt_factors(&mut self) {
+        let factors = self.job.as_mut().map_or([None; 2], |job| core::mem::take(&mut job.factors));
+        for input in [factors[0].map(Input::Speed), factors[1].map(Input::Flow)].into_iter().flatten() {
+            self.set_factor(input);
         }
     }
 

@@ -120,6 +120,9 @@ impl Ready {
             Wait::Heat => {
                 if self.thermal.is_heated() {
                     self.wait = Wait::Nothing;
+                    if self.is_too_cold_to_go_on(now) {
+                        return;
+                    }
                     let is_start = self
                         .job
                         .as_ref()
