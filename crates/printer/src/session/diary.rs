@@ -52,7 +52,7 @@ struct Job {
     /// The board counts since its drivers were powered up, as far as is known.
     since_power_up: bool,
     /// It is put aside, and can be taken up from there.
-    is_parked: bool,
+    parked: Option<Parked>,
 }
 
 impl Job {
@@ -111,7 +111,7 @@ impl Diary {
             told_z: f64::NAN,
             height: None,
             since_power_up,
-            is_parked: false,
+            parked: None,
         });
     }
 
@@ -124,7 +124,6 @@ impl Diary {
         }
         let height = taken.height;
         let since_power_up = height.is_some_and(|height| height.since_power_up);
-        let is_parked = taken.parked.is_some();
         self.job = Some(Job {
             place,
             runs,
@@ -136,7 +135,7 @@ impl Diary {
             told_z: f64::NAN,
             height,
             since_power_up,
-            is_parked,
+            parked: taken.parked,
         });
     }
 
@@ -189,7 +188,7 @@ impl Diary {
             return;
         }
         let Some(job) = &mut self.job else { return board.control(&Command::MotionJob { id: NO_JOB }) };
-        job.is_parked = false;
+        job.parked = None;
         let id = job.next_id();
         board.control(&Command::MotionJob { id });
         self.writer.write(&Record::Run { id, run: job.runs, start: start.low().0, from });
@@ -206,7 +205,6 @@ impl Diary {
         board: &mut Board,
     ) {
         let Some(job) = &mut self.job else { return };
-        job.is_parked = true;
         let of = job.id;
         let id = job.next_id();
         board.control(&Command::MotionJob { id });
@@ -214,12 +212,24 @@ impl Diary {
             let MotorQueue { received, done, left, dir, position, crc, .. } = queue;
             Dropped { received, done, left, dir, position, crc }
         });
-        self.writer.write(&Record::Parked(Parked { id, of, is_cut, motors, rest: rest.low().0, retract }));
+        let parked = Parked { id, of, is_cut, motors, rest: rest.low().0, retract };
+        job.parked = Some(parked);
+        self.writer.write(&Record::Parked(parked));
+    }
+
+    /// What moved the head of a job that is put aside was broken off, and the board has dropped it: it counts anew.
+    pub(super) fn stay_parked(&mut self, board: &mut Board) {
+        let Some(job) = &mut self.job else { return };
+        let Some(parked) = job.parked else { return };
+        let parked = Parked { id: job.next_id(), ..parked };
+        job.parked = Some(parked);
+        board.control(&Command::MotionJob { id: parked.id });
+        self.writer.write(&Record::Parked(parked));
     }
 
     /// A run begins that is none of the job's. Unless the job was put aside, it cannot be taken up any more.
     pub(super) fn other_run(&mut self, board: &mut Board) {
-        if !self.job.as_ref().is_some_and(|job| job.is_parked) {
+        if self.job.as_ref().is_none_or(|job| job.parked.is_none()) {
             self.lose_place(board);
         }
     }
@@ -227,7 +237,7 @@ impl Diary {
     /// Where the machine stands is told by other things than its motors' counts: the job cannot be taken up.
     pub(super) fn lose_place(&mut self, board: &mut Board) {
         if let Some(job) = self.job.as_mut().filter(|_| board.layout.has_motion_clock) {
-            job.is_parked = false;
+            job.parked = None;
             board.control(&Command::MotionJob { id: NO_JOB });
         }
     }

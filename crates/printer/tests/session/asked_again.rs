@@ -9,7 +9,7 @@ use units::{Celsius, Mm};
 use virtual_printer::BoardProfile;
 
 use crate::{
-    attach::{die, file, setup, started, take_up},
+    attach::{die, file, setup, started, take_up, take_up_paused},
     bench::{Bench, Setup},
     hold::{clean as clean_hold, held, holds, on_the_way, printed, stall},
     pause::{assert_whole, clean, pause},
@@ -163,6 +163,37 @@ fn a_pause_on_the_way_back_is_a_pause() {
         }
         assert!(broken_off > 4, "{broken_off}");
     }
+}
+
+#[test]
+fn a_host_may_die_once_a_way_back_was_broken_off() {
+    let setup = setup(BoardProfile::rp2040());
+    let file = file();
+    let (mut bench, _) = started(&setup, &file);
+    bench.job_over();
+    let expected = bench.counts();
+    let mut broken_off = 0;
+    for step in 0..8 {
+        let (mut bench, _) = started(&setup, &file);
+        bench.run(3.0);
+        pause(&mut bench);
+        bench.ask(Request::Resume);
+        bench.run(0.08 * f64::from(step));
+        if has_gone_on(&bench) {
+            break;
+        }
+        bench.ask(Request::Pause);
+        is_paused(&mut bench, 10.0);
+        broken_off += 1;
+        die(&mut bench, &setup, 2.0);
+        take_up_paused(&mut bench, &file);
+        bench.ask(Request::Resume);
+        bench.job_over();
+        bench.job_done();
+        assert!(bench.state().motors.iter().all(|motor| motor.lost.0 == 0));
+        assert_eq!(bench.counts(), expected, "{step}");
+    }
+    assert!(broken_off > 2, "{broken_off}");
 }
 
 #[test]

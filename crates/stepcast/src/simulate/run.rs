@@ -311,6 +311,8 @@ impl Simulation {
                 }
                 Wish::Held => match self.consent_after {
                     Some(after) => {
+                        // It is what a pause comes to while what is held is heated again.
+                        self.pauses.is_refused();
                         self.consent_at = Some(self.printer.now() + self.ticks(after));
                         self.held_at = self.printer.recorder().last_step;
                         Ok(())

@@ -117,6 +117,7 @@ impl Ready {
     pub(super) fn stand_parked(&mut self, counts: &[i32; MOTORS], now: Seconds) {
         self.events.push(Event::RunBroken { at: self.board.motion_at(now) });
         self.stand_at(counts, now);
+        self.diary.stay_parked(&mut self.board);
         let cut = self.job.as_ref().and_then(|job| job.paused.as_ref()).and_then(|it| it.cut.as_ref());
         if let Some(fan) = cut.map(|cut| cut.left.fan) {
             self.set_fan_now(fan, now);
@@ -127,6 +128,7 @@ impl Ready {
     pub(super) fn stand_on_the_way_back(&mut self, counts: &[i32; MOTORS], now: Seconds) {
         let fan = self.thermal.fan_speed();
         self.stand_at(counts, now);
+        self.diary.stay_parked(&mut self.board);
         self.set_fan_now(fan, now);
     }
 

@@ -51,6 +51,9 @@ impl Simulation {
                 let is_paused = self.session.job_status() == JobStatus::Paused;
                 if self.session.request(Request::Pause, now).is_err() || is_paused {
                     self.pauses.is_refused();
+                } else if self.consent_at.take().is_some() {
+                    // What was held is paused instead of being gone on with.
+                    self.held_at = None;
                 }
                 Ok(())
             }
