@@ -16,6 +16,8 @@ const RAMP: Seconds = Seconds(0.3);
 const HEATERS_ALONE: Seconds = Seconds(5.0);
 /// All of that is looked at and reported with this delay.
 const HEATERS_SPARE: Seconds = Seconds(2.0);
+/// The orders of a host that is gone come so late at most.
+const ORDERS_COME: Seconds = Seconds(1.1);
 /// Steps so long after a board has failed belong to motion that has begun anew.
 const STILL_AFTER: Seconds = Seconds(0.1);
 
@@ -176,7 +178,8 @@ impl Judging<'_> {
         let aftermath = &self.print.aftermath;
         let Some(died) = aftermath.host_died else { return };
         self.heaters(died, standby, finding);
-        let was_heated = aftermath.heated + self.clock.ticks_in(HEATERS_SPARE) > died;
+        // What the host had ordered before has come by then: nobody switches it off but the board.
+        let was_heated = aftermath.heated > died + self.clock.ticks_in(ORDERS_COME);
         if was_heated && self.print.report.after.shutdown.is_none() {
             finding.broken.push("the board did not stop although its heaters had no orders".to_owned());
         }

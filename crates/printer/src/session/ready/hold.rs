@@ -246,6 +246,11 @@ impl Ready {
         self.thermal.heater(gcode::Heater::Tool(0)).and_then(crate::heater::Heater::temperature)
     }
 
+    /// Whether it is known how warm the nozzle is, where there is one: a host that has just come has to wait for that.
+    pub(super) fn is_nozzle_read(&self) -> bool {
+        self.config.extruder.is_none() || self.nozzle().is_some()
+    }
+
     /// What is held is not heated any longer before it goes on: the user is asked again, and the nozzle, which may stick to
     /// the part, stays where it is. `false` where it was not.
     pub(super) fn stop_heating_held(&mut self) -> bool {
@@ -290,9 +295,9 @@ impl Ready {
         let is_cold = could_extrude && (has_cooled || self.extrusion_permit() != ExtrusionPermit::Allowed);
         let min = self.config.extruder.as_ref().map_or(Celsius::ZERO, |it| it.heater.min_extrude_temp);
         let goal = self.thermal.goal(gcode::Heater::Tool(0), before);
-        if is_cold && (goal <= Celsius::ZERO || goal < min) {
-            let celsius = self.nozzle().unwrap_or_default().0;
-            let detail = format!("the nozzle has cooled to {celsius:.0} °C meanwhile");
+        // A host that has just come waits for the first reading.
+        if let Some(nozzle) = self.nozzle().filter(|_| is_cold && (goal <= Celsius::ZERO || goal < min)) {
+            let detail = format!("the nozzle has cooled to {:.0} °C meanwhile", nozzle.0);
             return Err(PrinterError::new(ErrorCode::ColdExtrusion, detail));
         }
         let heats = self.thermal.reheat(before, &mut self.board, now)?;
@@ -375,13 +380,14 @@ impl Ready {
             Phase::AtRest => self.cool_down(now),
             Phase::Heating => {
                 self.last_active = now;
+                let is_heated = self.thermal.is_heated() && self.is_nozzle_read();
                 let is_cold = self.extrusion_permit() != ExtrusionPermit::Allowed;
-                if self.thermal.is_heated() && hold.could_extrude && is_cold {
+                if is_heated && hold.could_extrude && is_cold {
                     // It was switched off meanwhile: that is no way to go on.
                     hold.phase = Phase::AtRest;
                     let detail = "the nozzle was switched off while it was heated again";
                     self.events.push(Event::Held(PrinterError::new(ErrorCode::ColdExtrusion, detail)));
-                } else if self.thermal.is_heated() {
+                } else if is_heated {
                     hold.phase = hold.warm(now);
                 }
             }

@@ -118,7 +118,7 @@ impl Ready {
                 }
             }
             Wait::Heat => {
-                if self.thermal.is_heated() {
+                if self.thermal.is_heated() && self.is_nozzle_read() {
                     self.wait = Wait::Nothing;
                     if self.is_too_cold_to_go_on(now) {
                         return;
