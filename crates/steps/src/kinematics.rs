@@ -52,50 +52,24 @@ impl Kinematics for Cartesian {
     }
 }
 
-/// The three phases of a motor whose position is linear in the distance along the path: `ratio` mm of the motor a mm.
+/// The phases of a motor whose position is linear in the distance along the path: `ratio` mm of the motor a mm.
 fn linear_segments(planned: &PlannedMove, from: f64, to: f64, ratio: f64, out: &mut Vec<MotorSegment>) {
     if from == to {
         return;
     }
-    let half_accel = 0.5 * planned.accel * ratio;
-    let has_decel = planned.decel_time > 0.0;
-    let has_cruise = planned.cruise_time > 0.0;
-    let mut time = planned.start_time;
-    let mut position = from;
-    if planned.accel_time > 0.0 {
-        let end = if has_cruise || has_decel { from + ratio * planned.accel_length() } else { to };
+    let mut start_time = planned.start_time;
+    let mut start = from;
+    for phase in planned.phases() {
+        let end = if phase.end_distance == planned.length { to } else { from + ratio * phase.end_distance };
         out.push(MotorSegment {
-            start_time: time,
-            duration: planned.accel_time,
-            start: position,
+            start_time,
+            duration: phase.duration,
+            start,
             end,
-            velocity: planned.start_velocity * ratio,
-            half_accel,
+            velocity: phase.velocity * ratio,
+            half_accel: 0.5 * phase.accel * ratio,
         });
-        time += planned.accel_time;
-        position = end;
-    }
-    if has_cruise {
-        let end = if has_decel { to - ratio * planned.decel_length() } else { to };
-        out.push(MotorSegment {
-            start_time: time,
-            duration: planned.cruise_time,
-            start: position,
-            end,
-            velocity: planned.cruise_velocity * ratio,
-            half_accel: 0.0,
-        });
-        time += planned.cruise_time;
-        position = end;
-    }
-    if has_decel {
-        out.push(MotorSegment {
-            start_time: time,
-            duration: planned.decel_time,
-            start: position,
-            end: to,
-            velocity: planned.cruise_velocity * ratio,
-            half_accel: -half_accel,
-        });
+        start_time += phase.duration;
+        start = end;
     }
 }
