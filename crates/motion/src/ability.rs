@@ -64,8 +64,8 @@ impl<'a> Ability<'a> {
         loop {
             let stair = self.stair(v2);
             let needed = (stair.until_v2 - v2) * (0.5 / stair.accel);
-            // Written so that the top, where nothing is left, ends it.
-            if !(needed < length) || stair.until_v2 <= v2 {
+            // Also where the top needs more than any length.
+            if needed >= length || stair.until_v2 <= v2 {
                 return v2 + 2.0 * stair.accel * length;
             }
             length -= needed;
@@ -107,7 +107,7 @@ pub(crate) fn peak(up: &Ability<'_>, down: &Ability<'_>, start_v2: f64, end_v2: 
         let slope = 0.5 / speeding.accel + 0.5 / slowing.accel;
         let until = speeding.until_v2.min(slowing.until_v2);
         let needed = (until - v2) * slope;
-        if !(needed < left) || until <= v2 {
+        if needed >= left || until <= v2 {
             return v2 + (left / slope).max(0.0);
         }
         left -= needed;

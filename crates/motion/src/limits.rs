@@ -105,7 +105,7 @@ impl Limits {
                 (self.max_xy_velocity[axis].0, ["max_x_velocity", "max_y_velocity"][axis]),
                 (self.max_xy_accel[axis].0, ["max_x_accel", "max_y_accel"][axis]),
             ] {
-                if !(value >= 1.0 / LIMIT_MAX) {
+                if value.is_nan() || value < 1.0 / LIMIT_MAX {
                     return Err(LimitsError::NotPositive(name));
                 }
             }

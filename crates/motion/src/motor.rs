@@ -172,7 +172,7 @@ impl Torque {
         let left = |torque: f64| self.margin * torque - self.load;
         let best = self.pull_out.iter().map(|point| left(point.1)).fold(0.0, f64::max);
         let least = best * ACCEL_LEFT_MIN;
-        if !(left(self.pull_out[0].1) > least) {
+        if left(self.pull_out[0].1) <= least {
             return None;
         }
         for pair in self.pull_out.windows(2) {

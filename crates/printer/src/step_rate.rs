@@ -21,12 +21,46 @@ const SLACK: f64 = 1e-9;
 #[derive(Clone, Copy, Debug)]
 pub struct StepRates {
     speed_max: [MmPerS; MOTORS],
+    /// Where each motor's torque ends, where that is known.
+    torque_tops: [Option<MmPerS>; MOTORS],
 }
 
 impl StepRates {
     /// Of a machine on a board with this clock.
     pub fn new(config: &PrinterConfig, clock: Hertz) -> Self {
-        Self { speed_max: machine::motor_speeds_max(config, clock) }
+        Self {
+            speed_max: machine::motor_speeds_max(config, clock),
+            torque_tops: config.abilities.each_ref().map(|it| it.as_ref().map(motion::MotorAbility::top)),
+        }
+    }
+
+    /// The motor whose torque does not last for a move at this speed, with the speeds that it would have to make and can.
+    /// Speeds that the limits do not leave anyway count for nothing.
+    pub fn out_of_torque(
+        &self,
+        from: Position,
+        to: Position,
+        feed: MmPerS,
+        limits: &Limits,
+    ) -> Option<(usize, MmPerS, MmPerS)> {
+        let delta: [f64; MOTORS] = core::array::from_fn(|motor| (to[motor] - from[motor]).abs());
+        let travel = delta[..EXTRUDER].iter().map(|d| d * d).sum::<f64>().sqrt();
+        let (length, feed) = if travel > 0.0 {
+            (travel, feed.min(limits.max_velocity))
+        } else {
+            (delta[EXTRUDER], feed.min(limits.extruder.max_extrude_only_velocity))
+        };
+        let bounds = [
+            limits.max_xy_velocity[0],
+            limits.max_xy_velocity[1],
+            limits.max_z_velocity,
+            MmPerS(f64::INFINITY),
+        ];
+        (0..MOTORS).find_map(|motor| {
+            let top = self.torque_tops[motor]?;
+            let speed = (feed * (delta[motor] / length)).min(bounds[motor]);
+            (speed > top * (1.0 + SLACK)).then_some((motor, speed, top))
+        })
     }
 
     /// Refuses what no driver can step, by the highest speed that the limits leave. An extruder that moves along with

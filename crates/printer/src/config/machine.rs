@@ -22,6 +22,16 @@ pub enum Kinematics {
     Cartesian,
 }
 
+/// What becomes of a move that is faster than its motors' torque allows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UnreachableSpeed {
+    /// It is made as fast as they can, and the user is told.
+    #[default]
+    Clamp,
+    /// It is refused.
+    Reject,
+}
+
 /// `[printer]`: limits of the whole machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineConfig {
@@ -52,6 +62,8 @@ pub struct MachineConfig {
     pub max_xy_accel: [MmPerS2; 2],
     /// The other rule for corners (as in Marlin), instead of `square_corner_velocity`.
     pub junction_deviation: Option<Mm>,
+    /// What becomes of a move that is faster than its motors' torque allows (an option of our own).
+    pub unreachable_speed: UnreachableSpeed,
 }
 
 /// `[idle_timeout]`.
@@ -146,6 +158,14 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
     let xy_accel = ["max_x_accel", "max_y_accel"].map(|name| reader.optional_number(name, accel));
     let junction_deviation =
         reader.optional_number("junction_deviation", Range::from(0.0).to(JUNCTION_DEVIATION_MAX_MM));
+    let unreachable_speed = match reader.text("unreachable_speed").as_deref() {
+        None | Some("clamp") => Ok(UnreachableSpeed::Clamp),
+        Some("reject") => Ok(UnreachableSpeed::Reject),
+        Some(other) => {
+            let problem = format!("`{}` is neither `clamp` nor `reject`", excerpt(other));
+            Err(reader.error("unreachable_speed", problem))
+        }
+    };
     reader.finish();
     let [max_x_velocity, max_y_velocity] = xy_velocity;
     let [max_x_accel, max_y_accel] = xy_accel;
@@ -166,6 +186,7 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
         max_xy_velocity: [max_x_velocity?, max_y_velocity?].map(|it| MmPerS(it.unwrap_or(f64::INFINITY))),
         max_xy_accel: [max_x_accel?, max_y_accel?].map(|it| MmPerS2(it.unwrap_or(f64::INFINITY))),
         junction_deviation: junction_deviation?.map(Mm),
+        unreachable_speed: unreachable_speed?,
     })
 }
 

@@ -28,7 +28,7 @@ pub(crate) use source::Next;
 pub use source::{SOURCE_BYTES_MAX, Source};
 
 use crate::{
-    config::PrinterConfig,
+    config::{PrinterConfig, UnreachableSpeed},
     error::{ErrorCode, PrinterError},
     machine::{self, EXTRUDER},
     step_rate::StepRates,
@@ -68,6 +68,7 @@ struct Said {
     pressure_advance: bool,
     other_fans: bool,
     slowed: bool,
+    clamped: bool,
 }
 
 /// Turns G-code into step commands.
@@ -93,6 +94,7 @@ pub struct Planner {
     barrier: Option<(LineNumber, Barrier)>,
     said: Said,
     step_rates: StepRates,
+    unreachable_speed: UnreachableSpeed,
     is_broken: bool,
 }
 
@@ -100,7 +102,7 @@ impl Planner {
     /// A planner for a machine and a board's clock. No axis is homed, and the machine stands at 0, 0, 0.
     pub fn new(config: &PrinterConfig, clock: Hertz) -> Result<Self, PrinterError> {
         let limits = machine::limits(config);
-        let look_ahead = LookAhead::new(limits)
+        let look_ahead = LookAhead::with_motors(limits, config.abilities.to_vec())
             .map_err(|error| PrinterError::new(ErrorCode::ConfigInvalid, error.to_string()))?;
         Ok(Self {
             guard: Guard::new(config),
@@ -120,6 +122,7 @@ impl Planner {
             barrier: None,
             said: Said::default(),
             step_rates: StepRates::new(config, clock),
+            unreachable_speed: config.printer.unreachable_speed,
             is_broken: false,
         })
     }
@@ -401,6 +404,7 @@ impl Planner {
         let from = gcode::Position { x, y, z, e: e - e_offset };
         self.guard.judge(&Move { from, ..*mv })?;
         let feed = self.feed(mv, to, source);
+        self.judge_torque(to, feed, mv.line)?;
         self.push(to, feed, mv.line)
     }
 
@@ -414,6 +418,29 @@ impl Planner {
             self.notice(mv.line, "a move is made slower than the factor asks: a motor cannot step faster");
         }
         feed
+    }
+
+    /// A move that is faster than its motors' torque allows is slowed down by the look-ahead: the user is told, or it is
+    /// refused, as the machine file says.
+    fn judge_torque(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
+        if to == self.position || self.said.clamped {
+            return Ok(());
+        }
+        let found = self.step_rates.out_of_torque(self.position, to, feed, &self.limits);
+        let Some((motor, speed, top)) = found else { return Ok(()) };
+        let name = machine::MOTOR_NAMES[motor];
+        if self.unreachable_speed == UnreachableSpeed::Reject {
+            let detail = format!("{name} at {:.0} mm/s, its torque lasts up to {:.0} mm/s", speed.0, top.0);
+            return Err(PrinterError::new(ErrorCode::StepRateTooHigh, detail).at_line(line.0));
+        }
+        self.said.clamped = true;
+        let text = format!(
+            "moves are made slower than the file asks: {name} would have to go {:.0} mm/s, and its torque lasts up to \
+             {:.0} mm/s",
+            speed.0, top.0
+        );
+        self.notice(line, &text);
+        Ok(())
     }
 
     fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {

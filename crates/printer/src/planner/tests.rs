@@ -51,7 +51,10 @@ fn plan(text: &str) -> Vec<Planned> {
 }
 
 fn moves(items: &[Planned]) -> Vec<PlannedMove> {
-    items.iter().filter_map(|item| if let Planned::Move(mv) = item { Some(*mv) } else { None }).collect()
+    items
+        .iter()
+        .filter_map(|item| if let Planned::Move(mv) = item { Some(mv.clone()) } else { None })
+        .collect()
 }
 
 fn timed(items: &[Planned]) -> Vec<(f64, u32, TimedAction)> {
@@ -263,7 +266,7 @@ fn what_a_factor_makes_too_fast_for_a_motor_is_slowed_down_and_what_the_file_ask
     assert_eq!(plan("M220 S100", 12_000), Err(ErrorCode::StepRateTooHigh));
     for factors in ["M220 S300", "M220 S200\nM221 S102"] {
         let items = plan(factors, 7200).unwrap();
-        let filament = moves(&items)[0];
+        let filament = &moves(&items)[0];
         let speed = filament.cruise_velocity * filament.direction[EXTRUDER].abs();
         assert!((speed - slowest.0).abs() < 1e-6 * slowest.0, "{speed} mm/s of {slowest:?}");
         let said =
