@@ -8,6 +8,9 @@ use nalgebra::{Vector3, Vector4};
 /// Shorter moves (mm) are no moves: less than rounding in a file could mean.
 pub(crate) const LENGTH_MIN_MM: f64 = 1e-9;
 
+/// The place of the filament among the coordinates.
+const EXTRUDER: usize = 3;
+
 /// A move that waits in the window: what limits it, in squared speeds (mm²/s²).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {
@@ -80,13 +83,25 @@ impl Entry {
             velocity = velocity.min(limits.extruder.max_extrude_only_velocity.0 * path_per_e);
             accel = accel.min(limits.extruder.max_extrude_only_accel.0 * path_per_e);
         }
-        let mut jump = if motors.is_empty() { 0.0 } else { f64::INFINITY };
-        for (motor, share) in motors.iter().zip(direction.iter()) {
-            let (Some(motor), true) = (motor, *share != 0.0) else { continue };
-            velocity = velocity.min(motor.calm(motor.top().0.min(velocity * share.abs())) / share.abs());
-            jump = jump.min(motor.start().0 / share.abs());
+        let corner_extruder = limits.extruder.instantaneous_corner_velocity.0;
+        let mut jump = if motors.is_empty() { 0.0 } else { velocity };
+        for (axis, motor) in motors.iter().enumerate() {
+            let share = direction[axis].abs();
+            if share == 0.0 {
+                continue;
+            }
+            let start = match motor {
+                Some(motor) => {
+                    velocity = velocity.min(motor.calm(motor.top().0.min(velocity * share)) / share);
+                    motor.start().0
+                }
+                // A motor of which nothing is known starts from rest.
+                None if axis < EXTRUDER => 0.0,
+                None => corner_extruder,
+            };
+            jump = jump.min(start / share);
         }
-        let jump = if jump.is_finite() { jump.min(velocity) } else { 0.0 };
+        let jump = jump.min(velocity);
         Some(Self {
             tag: request.tag,
             from: request.from,
@@ -96,7 +111,7 @@ impl Entry {
             accel,
             travels,
             junction_deviation: limits.junction_deviation_mm(),
-            corner_extruder: limits.extruder.instantaneous_corner_velocity.0,
+            corner_extruder,
             cruise_limit: velocity * velocity,
             nominal_time: length / velocity,
             smoothed_accel: accel.min(limits.smoothed_accel_mm_s2()),

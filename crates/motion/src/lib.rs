@@ -12,6 +12,7 @@
 //! speeds, so that with constant acceleration `v² = v₀² + 2·a·d`.
 
 mod ability;
+mod bound;
 mod junction;
 mod limits;
 mod look_ahead;
@@ -19,6 +20,7 @@ mod motor;
 mod planned;
 mod window;
 
+pub use bound::Bound;
 pub use limits::{ExtruderLimits, Limits, LimitsError};
 pub use look_ahead::{
     LOOK_AHEAD_MOVES_MAX, LookAhead, MoveError, MoveRequest, READY_MOVES_MAX, RUN_TIME_MAX,

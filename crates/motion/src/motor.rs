@@ -86,6 +86,7 @@ struct Stair {
 /// What a motor can do, as its axis sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorAbility {
+    torque: Torque,
     speeding: Vec<Stair>,
     slowing: Vec<Stair>,
     top: f64,
@@ -106,6 +107,7 @@ impl Torque {
             return Err(TorqueError::Overloaded);
         }
         Ok(MotorAbility {
+            torque: self.clone(),
             speeding,
             slowing,
             top: self.mm_per_step() * top_rate,
@@ -270,6 +272,17 @@ impl MotorAbility {
             Some(stair) => (stair.accel, stair.until_v2),
             None => (stairs.last().map_or(0.0, |last| last.accel), f64::INFINITY),
         }
+    }
+
+    /// What the table itself leaves at a speed, without its staircase; nothing counts as the least that is not nothing.
+    pub(crate) fn exact(&self, speed: f64, demand: Demand) -> f64 {
+        let torque = &self.torque;
+        let rate = speed / torque.mm_per_step();
+        let (table, sign) = match demand {
+            Demand::Speed => (&torque.pull_out, -1.0),
+            Demand::Slow => (torque.pull_out_slowing.as_ref().unwrap_or(&torque.pull_out), 1.0),
+        };
+        torque.accel(torque.margin * interpolate(table, rate) + sign * torque.load).max(f64::MIN_POSITIVE)
     }
 
     /// The same in speeds: acceleration of the axis at a speed.

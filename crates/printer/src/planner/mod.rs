@@ -16,13 +16,13 @@ mod tests;
 use std::collections::VecDeque;
 
 use gcode::{Action, Diagnostic, DiagnosticCode, LineNumber, Move, Severity, VelocityLimit, Wait};
-use motion::{Limits, LookAhead, MoveRequest, PlannedMove};
+use motion::{Bound, Limits, LookAhead, MoveRequest, PlannedMove};
 use steps::{PushError, StepGenerator};
 use units::{Hertz, MmPerS, Seconds, Ticks};
 
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
-pub use report::{MotorReport, PLAN_CLOCK, PlanReport, PlanStream};
+pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanStream};
 pub(crate) use skip::{Skip, Skipped};
 pub(crate) use source::Next;
 pub use source::{SOURCE_BYTES_MAX, Source};
@@ -96,6 +96,8 @@ pub struct Planner {
     step_rates: StepRates,
     unreachable_speed: UnreachableSpeed,
     is_broken: bool,
+    /// What the plan is held against, where somebody wants to know.
+    bound: Option<Box<Bound>>,
 }
 
 impl Planner {
@@ -124,7 +126,13 @@ impl Planner {
             step_rates: StepRates::new(config, clock),
             unreachable_speed: config.printer.unreachable_speed,
             is_broken: false,
+            bound: None,
         })
+    }
+
+    /// Works out the least time that the motion could take, beside the plan.
+    fn bound(&mut self, config: &PrinterConfig) {
+        self.bound = Some(Box::new(Bound::new(config.abilities.to_vec())));
     }
 
     /// Where the last accepted move ends.
@@ -208,6 +216,7 @@ impl Planner {
         let is_active = self.run == Run::Active;
         if is_active {
             self.look_ahead.flush();
+            self.bound.iter_mut().for_each(|bound| bound.stop());
             self.run = Run::Ending;
         }
         is_active
@@ -323,6 +332,7 @@ impl Planner {
             Action::Home { x, y, z } => self.barrier = Some((line, Barrier::Home([x, y, z]))),
             Action::Dwell(pause) if self.run == Run::Active && pause <= DWELL_IN_RUN_MAX => {
                 self.look_ahead.dwell(pause);
+                self.bound.iter_mut().for_each(|bound| bound.dwell(pause));
                 self.dwelt_until = self.look_ahead.print_time();
             }
             Action::Dwell(pause) => self.barrier = Some((line, Barrier::Dwell(pause))),
@@ -462,6 +472,9 @@ impl Planner {
         // The look-ahead drops moves without length.
         self.moves_pushed += (self.look_ahead.len() - before) as u64;
         self.position = to;
+        if let Some(bound) = &mut self.bound {
+            bound.push(&request, &self.limits);
+        }
         Ok(())
     }
 
