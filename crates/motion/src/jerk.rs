@@ -1,9 +1,9 @@
 //! Limits the jerk along the path of moves whose speeds have been planned.
 //!
 //! In: trapezoids, out: the same moves with speeds that stay below those, whose acceleration changes by no more than the
-//! jerk allows, also from one move to the next. What a corner does to the motors is not the path's jerk and not looked at.
+//! jerk allows, also from one move to the next. Only at corners it may jump: there the motors' speeds do so anyway.
 //!
-//! The trapezoids' speeds at the junctions are limits. Between two junctions at which the acceleration is zero (*knots*) the
+//! The trapezoids' speeds at the junctions are limits. Between two junctions whose speed is settled (*knots*) the
 //! speed goes up, along and down again ([`s_curve`](crate::s_curve)). That lies below the trapezoids wherever their speed
 //! rises and falls once; where it does not, the lowest junction that is passed too fast becomes a knot too, until none is.
 //! What a knot cannot be reached from, or cannot reach, lowers it: one pass backward and one forward over all of them.
@@ -14,11 +14,13 @@
 
 use crate::PlannedMove;
 use crate::planned::Phase;
-use crate::s_curve::{Limits, highest};
+use crate::s_curve::{End, Limits, highest};
 use std::collections::VecDeque;
 
 /// Moves that are worked on at a time.
 pub(crate) const WINDOW_MOVES: usize = 512;
+/// Where the path's direction changes by more than this, it has a corner: the cosine of 5°.
+const CORNER_COS: f64 = 0.996_194_698_091_745_5;
 /// Speeds that are above their limit by no more than this share are on it: rounding.
 const SLACK: f64 = 1e-9;
 /// Steps in the search for the time at which a place is passed …
@@ -34,8 +36,10 @@ pub(crate) struct JerkLimiter {
     jerk: f64,
     /// Trapezoids that wait, oldest first.
     waiting: VecDeque<PlannedMove>,
-    /// Speed at the start of the first of them, where the acceleration is zero.
+    /// Speed at the start of the first of them.
     speed: f64,
+    /// The direction of the move before it.
+    before: Option<[f64; 4]>,
     /// Print time at which the last move that was given out ends.
     print_time: f64,
 }
@@ -49,7 +53,7 @@ struct Stretch {
 
 impl JerkLimiter {
     pub(crate) fn new(jerk_mm_s3: f64) -> Self {
-        Self { jerk: jerk_mm_s3, waiting: VecDeque::new(), speed: 0.0, print_time: 0.0 }
+        Self { jerk: jerk_mm_s3, waiting: VecDeque::new(), speed: 0.0, before: None, print_time: 0.0 }
     }
 
     pub(crate) fn begin_run(&mut self) {
@@ -93,7 +97,7 @@ impl JerkLimiter {
         if moves.is_empty() {
             return;
         }
-        let mut window = Window::new(moves, self.speed, self.jerk);
+        let mut window = Window::new(moves, self.speed, self.before, self.jerk);
         window.solve();
         let end = window.cut_at(count);
         let knots = window.knots();
@@ -105,6 +109,7 @@ impl JerkLimiter {
             self.print_time = cut(&moves[stretch.first..stretch.last], &phases, self.print_time, out);
         }
         self.speed = window.speed(end);
+        self.before = end.checked_sub(1).map(|last| moves[last].direction);
         self.waiting.drain(..end);
     }
 }
@@ -112,6 +117,8 @@ impl JerkLimiter {
 /// The moves in hand, with what has been decided at their junctions.
 struct Window<'a> {
     moves: &'a [PlannedMove],
+    /// The direction of the path before the first of them.
+    before: Option<[f64; 4]>,
     jerk: f64,
     /// Path up to each junction, from the first move's start.
     distances: Vec<f64>,
@@ -123,9 +130,9 @@ struct Window<'a> {
 #[derive(Clone, Copy, Debug)]
 struct Shape {
     limits: Limits,
-    start: f64,
+    start: End,
     peak: f64,
-    end: f64,
+    end: End,
     length: f64,
 }
 
@@ -136,7 +143,7 @@ impl Shape {
 }
 
 impl<'a> Window<'a> {
-    fn new(moves: &'a [PlannedMove], speed: f64, jerk: f64) -> Self {
+    fn new(moves: &'a [PlannedMove], speed: f64, before: Option<[f64; 4]>, jerk: f64) -> Self {
         let mut distances = vec![0.0];
         let mut distance = 0.0;
         for one in moves {
@@ -146,7 +153,7 @@ impl<'a> Window<'a> {
         let mut speeds = vec![None; moves.len() + 1];
         speeds[0] = Some(speed);
         speeds[moves.len()] = Some(0.0);
-        Self { moves, jerk, distances, speeds }
+        Self { moves, before, jerk, distances, speeds }
     }
 
     fn knots(&self) -> Vec<usize> {
@@ -170,14 +177,13 @@ impl<'a> Window<'a> {
     /// The fastest shape of a stretch under the speed of its moves, whatever its junctions say.
     fn shape(&self, stretch: Stretch) -> Shape {
         let limits = self.limits(stretch);
-        let (start, end, length) =
-            (self.speed(stretch.first), self.speed(stretch.last), self.length(stretch));
+        let (start, end, length) = (self.end(stretch.first), self.end(stretch.last), self.length(stretch));
         let moves = &self.moves[stretch.first..stretch.last];
         let top = moves.iter().fold(0.0, |top: f64, one| top.max(one.cruise_velocity));
         let mut shape = Shape { limits, start, end, length, peak: limits.peak(start, end, length, top) };
         // A move that is not the fastest one may have to hold the peak.
         for _ in 0..moves.len() {
-            let (from, to) = (limits.way(start, shape.peak), length - limits.way(shape.peak, end));
+            let (from, to) = (limits.way(start, shape.peak), length - limits.way(end, shape.peak));
             let first = self.distances[stretch.first];
             let slowest = moves
                 .iter()
@@ -191,9 +197,25 @@ impl<'a> Window<'a> {
             if slowest >= shape.peak {
                 break;
             }
-            shape.peak = slowest.max(start).max(end);
+            shape.peak = slowest.max(start.speed).max(end.speed);
         }
         shape
+    }
+
+    fn end(&self, junction: usize) -> End {
+        End { speed: self.speed(junction), is_free: self.is_corner(junction) }
+    }
+
+    /// Whether the path bends at a junction.
+    fn is_corner(&self, junction: usize) -> bool {
+        let before = if junction == 0 {
+            self.before.as_ref()
+        } else {
+            self.moves.get(junction - 1).map(|one| &one.direction)
+        };
+        let (Some(before), Some(after)) = (before, self.moves.get(junction)) else { return false };
+        let dot: f64 = (0..3).map(|axis| before[axis] * after.direction[axis]).sum();
+        dot < CORNER_COS && self.speed(junction) > 0.0
     }
 
     fn speed(&self, junction: usize) -> f64 {
@@ -238,7 +260,8 @@ impl<'a> Window<'a> {
         let (speed, other) = (self.speed(junction), self.speed(from));
         // The first one holds already: the window before saw to it.
         if speed > other && junction > 0 {
-            let reached = self.limits(stretch).reach(other, self.length(stretch), speed);
+            let reached =
+                self.limits(stretch).reach(self.end(from), self.end(junction), self.length(stretch));
             self.speeds[junction] = Some(reached);
         }
     }

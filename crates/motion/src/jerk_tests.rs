@@ -40,12 +40,19 @@ fn plan(points: &[([f64; 4], f64)], limits: Limits, jerk: Option<f64>) -> Vec<Pl
 fn check(made: &[PlannedMove], trapezoids: &[PlannedMove], jerk: f64) {
     assert_eq!(made.len(), trapezoids.len());
     let (mut time, mut speed, mut accel) = (0.0, 0.0, 0.0);
+    let mut direction: Option<[f64; 4]> = None;
     for (one, limit) in made.iter().zip(trapezoids) {
         assert_eq!((one.tag, one.from, one.to, one.length), (limit.tag, limit.from, limit.to, limit.length));
         assert!((one.start_time - time).abs() < 1e-9);
         time = one.end_time();
         let near = |a: f64, b: f64, scale: f64| (a - b).abs() <= 1e-5 * scale;
         let mut distance = 0.0;
+        let turn: f64 =
+            direction.map_or(1.0, |before| (0..3).map(|axis| before[axis] * one.direction[axis]).sum());
+        direction = Some(one.direction);
+        if turn < 0.9962 && speed > 0.0 {
+            accel = one.phases().next().unwrap().accel;
+        }
         for phase in one.phases() {
             assert!(phase.jerk.abs() <= jerk * (1.0 + 1e-9), "{phase:?}");
             assert!(near(phase.velocity, speed, 100.0), "{phase:?} after {speed}");
