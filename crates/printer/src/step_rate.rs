@@ -5,7 +5,7 @@
 
 use gcode::LineNumber;
 use motion::{Limits, PlannedMove};
-use units::{Hertz, MmPerS};
+use units::{Hertz, MmPerS, Seconds};
 
 use crate::{
     config::PrinterConfig,
@@ -21,12 +21,20 @@ const SLACK: f64 = 1e-9;
 #[derive(Clone, Copy, Debug)]
 pub struct StepRates {
     speed_max: [MmPerS; MOTORS],
+    /// Pressure advance adds so much to the filament's speed, mm/s a mm/s² of its acceleration.
+    advance: Seconds,
 }
 
 impl StepRates {
     /// Of a machine on a board with this clock.
     pub fn new(config: &PrinterConfig, clock: Hertz) -> Self {
-        Self { speed_max: machine::motor_speeds_max(config, clock) }
+        let advance = config.extruder.as_ref().map_or(Seconds::ZERO, |extruder| extruder.advance.slope_max());
+        Self { speed_max: machine::motor_speeds_max(config, clock), advance }
+    }
+
+    /// Another pressure advance holds, which adds so much.
+    pub const fn set_advance(&mut self, advance: Seconds) {
+        self.advance = advance;
     }
 
     /// Refuses what no driver can step, by the highest speed that the limits leave. An extruder that moves along with
@@ -69,9 +77,13 @@ impl StepRates {
     }
 
     /// Refuses a planned move in which a motor would have to step faster than it can.
+    /// Where it draws, pressure advance adds to the filament's speed.
     pub fn judge_planned(&self, planned: &PlannedMove) -> Result<(), PrinterError> {
+        let draws =
+            planned.direction[EXTRUDER] > 0.0 && (planned.direction[0] != 0.0 || planned.direction[1] != 0.0);
         for motor in 0..MOTORS {
-            let speed = MmPerS(planned.cruise_velocity * planned.direction[motor].abs());
+            let added = if draws && motor == EXTRUDER { self.advance.0 * planned.accel } else { 0.0 };
+            let speed = MmPerS((planned.cruise_velocity + added) * planned.direction[motor].abs());
             if speed > self.speed_max[motor] * (1.0 + SLACK) {
                 return Err(too_fast(motor, speed, planned.tag));
             }

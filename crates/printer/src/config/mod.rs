@@ -9,6 +9,7 @@
 
 mod diagnostics;
 mod document;
+mod dynamics;
 mod hints;
 mod machine;
 mod pin;
@@ -19,6 +20,7 @@ mod thermal;
 
 pub use diagnostics::{CONFIG_DIAGNOSTICS_MAX, ConfigDiagnostic, Severity};
 pub use document::CONFIG_BYTES_MAX;
+pub use dynamics::AxisShaperConfig;
 pub use machine::{FirmwareRetraction, IdleTimeoutConfig, Kinematics, MachineConfig, McuConfig};
 pub use pin::{PinSpec, Pull};
 pub use stepper::{MotorConfig, StepperConfig};
@@ -44,6 +46,8 @@ pub struct PrinterConfig {
     pub fan: Option<FanConfig>,
     /// `[idle_timeout]`.
     pub idle_timeout: IdleTimeoutConfig,
+    /// `[input_shaper]` for X and Y.
+    pub input_shaper: [AxisShaperConfig; 2],
     /// `[firmware_retraction]`: what G10 and G11 do; none where the section is missing.
     pub firmware_retraction: Option<FirmwareRetraction>,
     /// `[force_move] enable_force_move`: positions may be set by hand.
@@ -112,6 +116,7 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
     let heater_bed = thermal::heater_bed(&mut builder, &custom);
     let fan = thermal::fan(&mut builder);
     let idle_timeout = machine::idle_timeout(&mut builder);
+    let input_shaper = dynamics::input_shaper(&mut builder);
     let firmware_retraction = machine::firmware_retraction(&mut builder);
     let force_move = machine::force_move(&mut builder);
     rest::report(builder.document.into_rest(), builder.log);
@@ -123,6 +128,7 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
         heater_bed: heater_bed?,
         fan: fan?,
         idle_timeout: idle_timeout?,
+        input_shaper: input_shaper?,
         firmware_retraction: firmware_retraction?,
         force_move: force_move?,
     })
