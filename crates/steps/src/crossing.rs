@@ -243,11 +243,7 @@ impl Higher {
         let mut at = low + (high - low) * if (0.0..=1.0).contains(&rise) { rise } else { 0.5 };
         for _ in 0..APPROXIMATIONS_MAX {
             let beyond = (way(&self.powers, at) - self.edge) * self.step;
-            if beyond < 0.0 {
-                low = at
-            } else {
-                high = at
-            }
+            *(if beyond < 0.0 { &mut low } else { &mut high }) = at;
             let slope = c1 + (slopes[0] + (slopes[1] + (slopes[2] + slopes[3] * at) * at) * at) * at;
             let newton = at - beyond * self.step / slope;
             let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };

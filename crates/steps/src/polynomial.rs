@@ -63,11 +63,7 @@ pub(crate) fn sign_changes(coefficients: &[f64]) -> Roots {
             roots.push(root(coefficients, slope, low, high));
         }
         // A touch is no change of sign, but the next stretch starts on its own side.
-        if high.1 != 0.0 {
-            low = high;
-        } else {
-            low.0 = high.0;
-        }
+        low = (high.0, if high.1 == 0.0 { low.1 } else { high.1 });
     }
     roots
 }
@@ -79,11 +75,7 @@ fn root(coefficients: &[f64], slope: &[f64], low: (f64, f64), high: (f64, f64)) 
     let mut at = 0.5 * (low + high);
     for _ in 0..ITERATIONS_MAX {
         let here = value(coefficients, at);
-        if (here < 0.0) == rises {
-            low = at
-        } else {
-            high = at
-        }
+        *(if (here < 0.0) == rises { &mut low } else { &mut high }) = at;
         let newton = at - here / value(slope, at);
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         if (next - at).abs() <= 1e-15 * high {
