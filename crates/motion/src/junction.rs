@@ -1,10 +1,15 @@
 //! One move under its limits, and the speed at which two moves may meet.
 
+use crate::ability::{Ability, peak};
+use crate::motor::{Demand, MotorAbility};
 use crate::{Limits, MoveRequest};
 use nalgebra::{Vector3, Vector4};
 
 /// Shorter moves (mm) are no moves: less than rounding in a file could mean.
 pub(crate) const LENGTH_MIN_MM: f64 = 1e-9;
+
+/// The place of the filament among the coordinates.
+const EXTRUDER: usize = 3;
 
 /// A move that waits in the window: what limits it, in squared speeds (mm²/s²).
 #[derive(Clone, Copy, Debug)]
@@ -24,10 +29,10 @@ pub(crate) struct Entry {
     pub(crate) cruise_limit: f64,
     /// How long it would take at its highest cruising speed, s: it never takes less.
     pub(crate) nominal_time: f64,
-    /// What the acceleration can add to the squared speed over the whole length.
-    pub(crate) gain: f64,
-    /// The same with the virtual look-ahead's acceleration.
-    pub(crate) smoothed_gain: f64,
+    /// The gentler acceleration of the virtual look-ahead.
+    pub(crate) smoothed_accel: f64,
+    /// The squared speed that the motors may jump by: to start and to end with.
+    pub(crate) jump_v2: f64,
     /// The highest squared speed at the start, as far as the moves before it decide.
     pub(crate) start_limit: f64,
     /// The same in the virtual look-ahead.
@@ -36,7 +41,11 @@ pub(crate) struct Entry {
 
 impl Entry {
     /// The move under `limits`, starting from rest; `None` where nothing moves.
-    pub(crate) fn new(request: &MoveRequest, limits: &Limits) -> Option<Self> {
+    pub(crate) fn new(
+        request: &MoveRequest,
+        limits: &Limits,
+        motors: &[Option<MotorAbility>],
+    ) -> Option<Self> {
         let delta = Vector4::from(request.to) - Vector4::from(request.from);
         let travel_mm = norm(&delta.xyz());
         let travels = travel_mm >= LENGTH_MIN_MM;
@@ -58,6 +67,15 @@ impl Entry {
             velocity = velocity.min(limits.max_z_velocity.0 * path_per_z);
             accel = accel.min(limits.max_z_accel.0 * path_per_z);
         }
+        if travels {
+            for axis in 0..2 {
+                let share = direction[axis].abs();
+                if share > 0.0 {
+                    velocity = velocity.min(limits.max_xy_velocity[axis].0 / share);
+                    accel = accel.min(limits.max_xy_accel[axis].0 / share);
+                }
+            }
+        }
         // The filament sets the limits where it moves without x and y, and where it is pulled back.
         let filament_leads = direction.w < 0.0 || (direction.x == 0.0 && direction.y == 0.0);
         if direction.w != 0.0 && filament_leads {
@@ -65,6 +83,25 @@ impl Entry {
             velocity = velocity.min(limits.extruder.max_extrude_only_velocity.0 * path_per_e);
             accel = accel.min(limits.extruder.max_extrude_only_accel.0 * path_per_e);
         }
+        let corner_extruder = limits.extruder.instantaneous_corner_velocity.0;
+        let mut jump = if motors.is_empty() { 0.0 } else { velocity };
+        for (axis, motor) in motors.iter().enumerate() {
+            let share = direction[axis].abs();
+            if share == 0.0 {
+                continue;
+            }
+            let start = match motor {
+                Some(motor) => {
+                    velocity = velocity.min(motor.calm(motor.top().0.min(velocity * share)) / share);
+                    motor.start().0
+                }
+                // A motor of which nothing is known starts from rest.
+                None if axis < EXTRUDER => 0.0,
+                None => corner_extruder,
+            };
+            jump = jump.min(start / share);
+        }
+        let jump = jump.min(velocity);
         Some(Self {
             tag: request.tag,
             from: request.from,
@@ -74,26 +111,59 @@ impl Entry {
             accel,
             travels,
             junction_deviation: limits.junction_deviation_mm(),
-            corner_extruder: limits.extruder.instantaneous_corner_velocity.0,
+            corner_extruder,
             cruise_limit: velocity * velocity,
             nominal_time: length / velocity,
-            gain: 2.0 * length * accel,
-            smoothed_gain: 2.0 * length * accel.min(limits.smoothed_accel_mm_s2()),
-            start_limit: 0.0,
-            smoothed_start_limit: 0.0,
+            smoothed_accel: accel.min(limits.smoothed_accel_mm_s2()),
+            jump_v2: jump * jump,
+            start_limit: jump * jump,
+            smoothed_start_limit: jump * jump,
         })
     }
 
+    /// What the move can speed up by.
+    pub(crate) const fn speeding<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
+        Ability::new(self.accel, &self.direction, motors, Demand::Speed)
+    }
+
+    /// What it can slow down by.
+    pub(crate) const fn slowing<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
+        Ability::new(self.accel, &self.direction, motors, Demand::Slow)
+    }
+
+    /// The gentler speeding up of the virtual look-ahead.
+    pub(crate) const fn smoothed_speeding<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
+        Ability::new(self.smoothed_accel, &self.direction, motors, Demand::Speed)
+    }
+
+    /// The same for slowing down.
+    pub(crate) const fn smoothed_slowing<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
+        Ability::new(self.smoothed_accel, &self.direction, motors, Demand::Slow)
+    }
+
+    /// The top of the move between two squared speeds, should it not cruise.
+    pub(crate) fn peak(&self, start_v2: f64, end_v2: f64, motors: &[Option<MotorAbility>]) -> f64 {
+        peak(&self.speeding(motors), &self.slowing(motors), start_v2, end_v2, self.length)
+    }
+
     /// Sets the start limits of this move, which follows `previous` without a stop.
-    pub(crate) fn follow(&mut self, previous: &Self) {
-        let junction = self.junction_limit(previous);
-        self.start_limit = junction.min(previous.start_limit + previous.gain);
-        self.smoothed_start_limit =
-            self.start_limit.min(previous.smoothed_start_limit + previous.smoothed_gain);
+    pub(crate) fn follow(&mut self, previous: &Self, motors: &[Option<MotorAbility>]) {
+        self.start_limit = self.junction_limit(previous, motors);
+        self.smoothed_start_limit = self.start_limit;
+        self.keep_in_reach(previous, motors);
+    }
+
+    /// Lowers the start limits to what `previous` can speed up to.
+    pub(crate) fn keep_in_reach(&mut self, previous: &Self, motors: &[Option<MotorAbility>]) {
+        let length = previous.length;
+        self.start_limit =
+            self.start_limit.min(previous.speeding(motors).reach(previous.start_limit, length));
+        let smoothed = previous.smoothed_speeding(motors).reach(previous.smoothed_start_limit, length);
+        self.smoothed_start_limit = self.start_limit.min(self.smoothed_start_limit).min(smoothed);
     }
 
     /// The highest squared speed at which this move may follow `previous`, whatever their lengths allow.
-    fn junction_limit(&self, previous: &Self) -> f64 {
+    fn junction_limit(&self, previous: &Self, motors: &[Option<MotorAbility>]) -> f64 {
         if !(self.travels && previous.travels) {
             return 0.0;
         }
@@ -114,7 +184,14 @@ impl Entry {
             for entry in [self, previous] {
                 limit = limit.min(radius * entry.junction_deviation * entry.accel);
                 // The rounding circle may touch no move beyond its middle.
-                limit = limit.min(0.25 * entry.gain * tan_half);
+                limit = limit.min(0.5 * entry.length * entry.accel * tan_half);
+            }
+        }
+        for (axis, motor) in motors.iter().enumerate() {
+            let jump = (self.direction[axis] - previous.direction[axis]).abs();
+            if let (Some(motor), true) = (motor, jump > 0.0) {
+                let speed = motor.start().0 / jump;
+                limit = limit.min(speed * speed);
             }
         }
         limit

@@ -11,17 +11,24 @@
 //! documents in "Kinematics" and "Config_Reference"; the planner here is the forward and backward pass over squared
 //! speeds, so that with constant acceleration `v² = v₀² + 2·a·d`.
 
+mod ability;
+mod bound;
 mod junction;
 mod limits;
 mod look_ahead;
+mod motor;
 mod planned;
 mod window;
 
+pub use bound::Bound;
 pub use limits::{ExtruderLimits, Limits, LimitsError};
 pub use look_ahead::{
     LOOK_AHEAD_MOVES_MAX, LookAhead, MoveError, MoveRequest, READY_MOVES_MAX, RUN_TIME_MAX,
 };
-pub use planned::PlannedMove;
+pub use motor::{Demand, MotorAbility, TORQUE_POINTS_MAX, Torque, TorqueError};
+pub use planned::{Phase, PlannedMove};
 
+#[cfg(test)]
+mod motor_tests;
 #[cfg(test)]
 mod tests;

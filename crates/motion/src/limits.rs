@@ -18,6 +18,13 @@ pub struct Limits {
     pub max_z_velocity: MmPerS,
     /// The strongest acceleration of z.
     pub max_z_accel: MmPerS2,
+    /// The fastest that x and y may move, each by itself; infinite where only the path is limited.
+    pub max_xy_velocity: [MmPerS; 2],
+    /// The strongest acceleration of x and y, each by itself; infinite where only the path is limited.
+    pub max_xy_accel: [MmPerS2; 2],
+    /// The distance by which a path rounded at a corner's speed may miss the corner, where that is given instead of
+    /// `square_corner_velocity`.
+    pub junction_deviation: Option<Mm>,
     /// What the extruder allows.
     pub extruder: ExtruderLimits,
 }
@@ -68,6 +75,11 @@ pub enum LimitsError {
 const LIMIT_MAX: f64 = 1e9;
 
 impl Limits {
+    /// No limit of x and y by themselves.
+    pub const ANY_VELOCITY: [MmPerS; 2] = [MmPerS(f64::INFINITY); 2];
+    /// The same of their acceleration.
+    pub const ANY_ACCEL: [MmPerS2; 2] = [MmPerS2(f64::INFINITY); 2];
+
     /// Whether every limit is one that can be planned with.
     pub fn check(&self) -> Result<(), LimitsError> {
         let extruder = &self.extruder;
@@ -87,6 +99,20 @@ impl Limits {
                 return Err(LimitsError::OutOfRange(name));
             }
         }
+        // These may be infinite.
+        for axis in 0..2 {
+            for (value, name) in [
+                (self.max_xy_velocity[axis].0, ["max_x_velocity", "max_y_velocity"][axis]),
+                (self.max_xy_accel[axis].0, ["max_x_accel", "max_y_accel"][axis]),
+            ] {
+                if value.is_nan() || value < 1.0 / LIMIT_MAX {
+                    return Err(LimitsError::NotPositive(name));
+                }
+            }
+        }
+        if self.junction_deviation.is_some_and(|deviation| !(0.0..=LIMIT_MAX).contains(&deviation.0)) {
+            return Err(LimitsError::OutOfRange("junction_deviation"));
+        }
         for (value, name) in [
             (self.square_corner_velocity.0, "square_corner_velocity"),
             (extruder.instantaneous_corner_velocity.0, "instantaneous_corner_velocity"),
@@ -103,8 +129,12 @@ impl Limits {
     }
 
     /// The distance by which a path rounded at the corner speed would miss a corner, in mm: the corner's speed as a
-    /// length, so that it holds for every angle.
+    /// length, so that it holds for every angle. With the radius R = δ·sin(θ/2)/(1 − sin(θ/2)) of such a rounding the
+    /// corner's speed is v² = a·R.
     pub(crate) fn junction_deviation_mm(&self) -> f64 {
+        if let Some(deviation) = self.junction_deviation {
+            return deviation.0;
+        }
         let corner = self.square_corner_velocity.0;
         corner * corner * (core::f64::consts::SQRT_2 - 1.0) / self.max_accel.0
     }

@@ -2,7 +2,7 @@
 
 use crate::junction::Entry;
 use crate::window::Window;
-use crate::{Limits, LimitsError, PlannedMove};
+use crate::{Limits, LimitsError, MotorAbility, PlannedMove};
 use std::collections::VecDeque;
 use thiserror::Error;
 use units::{MmPerS, Seconds};
@@ -72,10 +72,18 @@ pub struct LookAhead {
 impl LookAhead {
     /// An empty window. Limits should have passed [`Limits::check`]; see [`Self::set_limits`].
     pub fn new(limits: Limits) -> Result<Self, LimitsError> {
+        Self::with_motors(limits, Vec::new())
+    }
+
+    /// The same for a machine of whose motors some have less torque the faster they turn: one entry for each of x, y, z
+    /// and the extruder, or none at all.
+    pub fn with_motors(limits: Limits, motors: Vec<Option<MotorAbility>>) -> Result<Self, LimitsError> {
         limits.check()?;
+        // What limits nothing costs nothing.
+        let motors = if motors.iter().any(Option::is_some) { motors } else { Vec::new() };
         Ok(Self {
             limits,
-            window: Window::default(),
+            window: Window::new(motors),
             ready: VecDeque::new(),
             print_time: 0.0,
             planned_position: None,
@@ -99,7 +107,7 @@ impl LookAhead {
     /// Starts a run of motion: print time is zero again, and the first move may start anywhere. Moves that were not
     /// taken are forgotten.
     pub fn begin_run(&mut self) {
-        self.window = Window::default();
+        self.window.clear();
         self.ready.clear();
         self.print_time = 0.0;
         self.planned_position = None;
@@ -112,14 +120,16 @@ impl LookAhead {
         self.check(request)?;
         // A dropped move is not forgotten: the next one starts where the plan ends.
         let from = self.planned_position.unwrap_or(request.from);
-        let Some(entry) = Entry::new(&MoveRequest { from, ..*request }, &self.limits) else {
+        let Some(entry) = Entry::new(&MoveRequest { from, ..*request }, &self.limits, self.window.motors())
+        else {
             self.planned_position = Some(from);
             self.position = Some(request.to);
             return Ok(());
         };
         let print_time = self.print_time + self.window.nominal_time() + entry.nominal_time;
+        let gain = entry.length * entry.accel;
         // Written so that NaN and infinity are refused too.
-        if !(entry.gain > 0.0 && entry.gain.is_finite() && print_time < RUN_TIME_MAX.0) {
+        if !(gain > 0.0 && gain.is_finite() && print_time < RUN_TIME_MAX.0) {
             return Err(MoveError::TooLong);
         }
         if self.ready.len() >= READY_MOVES_MAX {

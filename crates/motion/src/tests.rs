@@ -15,6 +15,9 @@ fn limits() -> Limits {
         minimum_cruise_ratio: 0.5,
         max_z_velocity: MmPerS(15.0),
         max_z_accel: MmPerS2(200.0),
+        max_xy_velocity: Limits::ANY_VELOCITY,
+        max_xy_accel: Limits::ANY_ACCEL,
+        junction_deviation: None,
         extruder: ExtruderLimits::for_nozzle(Mm(0.4), Mm(1.75), MmPerS(300.0), MmPerS2(3000.0)),
     }
 }
@@ -54,7 +57,7 @@ fn assert_near(a: f64, b: f64) {
 #[test]
 fn a_long_move_speeds_up_cruises_and_slows_down() {
     let planned = plan(&[([100.0, 0.0, 0.0, 0.0], 60.0)]);
-    let [one] = planned[..] else { panic!("one move gives one trapezoid") };
+    let [one] = &planned[..] else { panic!("one move gives one trapezoid") };
     assert_near(one.accel_time, 0.02);
     assert_near(one.decel_time, 0.02);
     assert_near(one.cruise_velocity, 60.0);
@@ -259,7 +262,8 @@ fn check_move(planned: &PlannedMove, limits: &Limits, feed: f64) {
     assert!(ramp_error <= 1e-6 * cruise_velocity + 1e-9, "speeding up: {planned:?}");
     let ramp_error = (end_velocity + accel * planned.decel_time - cruise_velocity).abs();
     assert!(ramp_error <= 1e-6 * cruise_velocity + 1e-9, "slowing down: {planned:?}");
-    let driven = planned.accel_length() + cruise_velocity * planned.cruise_time + planned.decel_length();
+    let driven: f64 =
+        planned.phases().map(|phase| phase.distance_at(phase.duration) - phase.start_distance).sum();
     assert!((driven - planned.length).abs() <= 1e-9 * planned.length + 1e-12, "{driven} of {planned:?}");
     for (axis, ratio) in direction.iter().enumerate() {
         let end = planned.from[axis] + ratio * planned.length;
@@ -333,7 +337,7 @@ proptest! {
         let mut at = [0.0; 4];
         for request in &requests {
             let request = MoveRequest { from: at, ..*request };
-            if let Some(entry) = crate::junction::Entry::new(&request, &limits) {
+            if let Some(entry) = crate::junction::Entry::new(&request, &limits, &[]) {
                 at = request.to;
                 whole.push(entry);
             }

@@ -10,7 +10,9 @@
 //! somebody looks, so the same moves always give the same plan; a forced release happens after a fixed number of moves.
 
 use crate::PlannedMove;
+use crate::ability::peak;
 use crate::junction::Entry;
+use crate::motor::MotorAbility;
 use std::collections::VecDeque;
 
 /// What the backward pass found for one move.
@@ -27,18 +29,34 @@ struct Node {
 /// Moves whose speeds may still change, oldest first.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Window {
+    /// Motors whose strength depends on speed, in the order of the coordinates; empty where none does.
+    motors: Vec<Option<MotorAbility>>,
     entries: VecDeque<Entry>,
     /// One for each entry after a backward pass.
     nodes: Vec<Node>,
     /// Sum of the entries' nominal times, s.
     nominal_time: f64,
-    /// Squared speed at which the last released move ends.
-    released_end_v2: f64,
+    /// Squared speed at which the last released move ends; `None` at rest, where a move may start with a jump.
+    released_end_v2: Option<f64>,
     /// Ceiling of the last released move.
     released_ceiling_v2: f64,
 }
 
 impl Window {
+    pub(crate) fn new(motors: Vec<Option<MotorAbility>>) -> Self {
+        Self { motors, ..Self::default() }
+    }
+
+    /// The motors that limit moves.
+    pub(crate) fn motors(&self) -> &[Option<MotorAbility>] {
+        &self.motors
+    }
+
+    /// Forgets all moves.
+    pub(crate) fn clear(&mut self) {
+        *self = Self::new(core::mem::take(&mut self.motors));
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.entries.len()
     }
@@ -54,7 +72,7 @@ impl Window {
 
     pub(crate) fn push(&mut self, mut entry: Entry) {
         if let Some(previous) = self.entries.back() {
-            entry.follow(previous);
+            entry.follow(previous, &self.motors);
         }
         self.nominal_time += entry.nominal_time;
         self.entries.push_back(entry);
@@ -77,18 +95,13 @@ impl Window {
     ) {
         self.plan();
         self.release(count.min(self.len()), print_time, out);
-        let end_v2 = self.released_end_v2;
-        let Some(first) = self.entries.front_mut() else { return };
+        let (Some(first), Some(end_v2)) = (self.entries.front_mut(), self.released_end_v2) else { return };
         // The junction is now fixed: to both profiles it is a limit like that of a corner.
         first.start_limit = end_v2;
         first.smoothed_start_limit = end_v2;
         let mut previous = *first;
         for entry in self.entries.iter_mut().skip(1) {
-            entry.start_limit = entry.start_limit.min(previous.start_limit + previous.gain);
-            entry.smoothed_start_limit = entry
-                .start_limit
-                .min(entry.smoothed_start_limit)
-                .min(previous.smoothed_start_limit + previous.smoothed_gain);
+            entry.keep_in_reach(&previous, &self.motors);
             previous = *entry;
         }
     }
@@ -96,13 +109,17 @@ impl Window {
     /// The backward pass, from rest at the end.
     fn plan(&mut self) {
         self.nodes.clear();
-        let mut next = After { v2: 0.0, smoothed_v2: 0.0, is_final: false, smoothed_is_final: false };
+        let end = self.entries.back().map_or(0.0, |last| last.jump_v2);
+        let mut next = After { v2: end, smoothed_v2: end, is_final: false, smoothed_is_final: false };
         // The peak of the virtual profile behind the move in hand, and whether it (or its absence) is final.
         let mut ceiling: Option<f64> = None;
         let mut ceiling_is_final = false;
         for entry in self.entries.iter().rev() {
-            let reach = next.v2 + entry.gain;
-            let smoothed_reach = next.smoothed_v2 + entry.smoothed_gain;
+            let motors = &self.motors;
+            let reach = entry.slowing(motors).reach(next.v2, entry.length);
+            let smoothed = entry.smoothed_speeding(motors);
+            let smoothed_slowing = entry.smoothed_slowing(motors);
+            let smoothed_reach = smoothed_slowing.reach(next.smoothed_v2, entry.length);
             let here = After {
                 v2: entry.start_limit.min(reach),
                 smoothed_v2: entry.smoothed_start_limit.min(smoothed_reach),
@@ -110,11 +127,13 @@ impl Window {
                 smoothed_is_final: entry.smoothed_start_limit <= smoothed_reach || next.smoothed_is_final,
             };
             if here.smoothed_v2 < smoothed_reach {
-                let has_peak = here.smoothed_v2 + entry.smoothed_gain > next.smoothed_v2;
+                let has_peak = smoothed.reach(here.smoothed_v2, entry.length) > next.smoothed_v2;
                 if has_peak || ceiling.is_none() {
                     ceiling_is_final =
                         next.smoothed_is_final && here.smoothed_is_final && (has_peak || ceiling_is_final);
-                    ceiling = Some(entry.cruise_limit.min(0.5 * (here.smoothed_v2 + smoothed_reach)));
+                    let (start, end) = (here.smoothed_v2, next.smoothed_v2);
+                    let top = peak(&smoothed, &smoothed_slowing, start, end, entry.length);
+                    ceiling = Some(entry.cruise_limit.min(top));
                 }
             } else {
                 ceiling = None;
@@ -136,28 +155,30 @@ impl Window {
             let Some(entry) = self.entries.pop_front() else { break };
             let node = self.nodes[index];
             let next = self.nodes.get(index + 1);
-            let start_v2 = self.released_end_v2;
             let ceiling_v2 = node.ceiling_v2.unwrap_or(self.released_ceiling_v2.min(node.start_v2));
+            let start_v2 = self.released_end_v2.unwrap_or(node.start_v2.min(ceiling_v2));
+            let motors = &self.motors;
             let end_v2 = next
-                .map_or(0.0, |next| {
+                .map_or(entry.jump_v2, |next| {
                     next.start_v2.min(ceiling_v2).min(next.ceiling_v2.unwrap_or(f64::INFINITY))
                 })
-                .min(start_v2 + entry.gain);
+                .min(entry.speeding(motors).reach(start_v2, entry.length));
             let cruise_v2 = entry
                 .cruise_limit
-                .min(0.5 * (start_v2 + end_v2 + entry.gain))
+                .min(entry.peak(start_v2, end_v2, motors))
                 .min(ceiling_v2)
                 .max(start_v2)
                 .max(end_v2);
-            let planned = PlannedMove::new(&entry, start_v2, cruise_v2, end_v2, *print_time);
+            let planned = PlannedMove::new(&entry, motors, [start_v2, cruise_v2, end_v2], *print_time);
             *print_time = planned.end_time();
             out.push_back(planned);
-            self.released_end_v2 = end_v2;
+            self.released_end_v2 = Some(end_v2);
             self.released_ceiling_v2 = ceiling_v2;
             self.nominal_time -= entry.nominal_time;
         }
         if self.entries.is_empty() {
             self.nominal_time = 0.0;
+            self.released_end_v2 = None;
         }
     }
 }

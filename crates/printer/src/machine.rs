@@ -80,6 +80,9 @@ pub fn limits(config: &PrinterConfig) -> Limits {
         minimum_cruise_ratio: printer.minimum_cruise_ratio,
         max_z_velocity: printer.max_z_velocity,
         max_z_accel: printer.max_z_accel,
+        max_xy_velocity: printer.max_xy_velocity,
+        max_xy_accel: printer.max_xy_accel,
+        junction_deviation: printer.junction_deviation,
         extruder,
     }
 }

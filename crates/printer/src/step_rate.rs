@@ -23,13 +23,48 @@ pub struct StepRates {
     speed_max: [MmPerS; MOTORS],
     /// Pressure advance adds so much to the filament's speed, mm/s a mm/s² of its acceleration.
     advance: Seconds,
+    /// Where each motor's torque ends, where that is known.
+    torque_tops: [Option<MmPerS>; MOTORS],
 }
 
 impl StepRates {
     /// Of a machine on a board with this clock.
     pub fn new(config: &PrinterConfig, clock: Hertz) -> Self {
         let advance = config.extruder.as_ref().map_or(Seconds::ZERO, |extruder| extruder.advance.slope_max());
-        Self { speed_max: machine::motor_speeds_max(config, clock), advance }
+        Self {
+            speed_max: machine::motor_speeds_max(config, clock),
+            advance,
+            torque_tops: config.abilities.each_ref().map(|it| it.as_ref().map(motion::MotorAbility::top)),
+        }
+    }
+
+    /// The motor whose torque does not last for a move at this speed, with the speeds that it would have to make and can.
+    /// Speeds that the limits do not leave anyway count for nothing.
+    pub fn out_of_torque(
+        &self,
+        from: Position,
+        to: Position,
+        feed: MmPerS,
+        limits: &Limits,
+    ) -> Option<(usize, MmPerS, MmPerS)> {
+        let delta: [f64; MOTORS] = core::array::from_fn(|motor| (to[motor] - from[motor]).abs());
+        let travel = delta[..EXTRUDER].iter().map(|d| d * d).sum::<f64>().sqrt();
+        let (length, feed) = if travel > 0.0 {
+            (travel, feed.min(limits.max_velocity))
+        } else {
+            (delta[EXTRUDER], feed.min(limits.extruder.max_extrude_only_velocity))
+        };
+        let bounds = [
+            limits.max_xy_velocity[0],
+            limits.max_xy_velocity[1],
+            limits.max_z_velocity,
+            MmPerS(f64::INFINITY),
+        ];
+        (0..MOTORS).find_map(|motor| {
+            let top = self.torque_tops[motor]?;
+            let speed = (feed * (delta[motor] / length)).min(bounds[motor]);
+            (speed > top * (1.0 + SLACK)).then_some((motor, speed, top))
+        })
     }
 
     /// Another pressure advance holds, which adds so much.

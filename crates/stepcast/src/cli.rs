@@ -61,6 +61,15 @@ pub(crate) struct PlanArgs {
     /// Write the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
+    /// Multiply every feed of the file by this
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
+    pub(crate) feed_scale: f64,
+    /// Work out the least time that the same moves could take under the same limits, on a fine grid
+    #[arg(long)]
+    pub(crate) bound: bool,
+    /// Plan with this minimum_cruise_ratio instead of the machine's
+    #[arg(long, value_name = "RATIO", value_parser = ratio)]
+    pub(crate) minimum_cruise_ratio: Option<f64>,
     /// Write the blocks that would be sent to a board into this file
     #[arg(long, value_name = "FILE")]
     pub(crate) dump_stream: Option<PathBuf>,
@@ -205,6 +214,18 @@ fn speed(text: &str) -> Result<f64, String> {
         Ok(factor) if SPEED_RANGE.contains(&factor) => Ok(factor),
         _ => Err(format!("a number from {min} to {max} is needed")),
     }
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    number(text, "a factor from 0.01 to 100", |value| (0.01..=100.0).contains(&value))
+}
+
+fn ratio(text: &str) -> Result<f64, String> {
+    number(text, "a ratio from 0 to below 1", |value| (0.0..1.0).contains(&value))
+}
+
+fn number(text: &str, what: &str, fits: impl Fn(f64) -> bool) -> Result<f64, String> {
+    text.parse().ok().filter(|&value| fits(value)).ok_or_else(|| format!("write {what}"))
 }
 
 #[cfg(test)]

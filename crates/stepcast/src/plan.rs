@@ -12,7 +12,7 @@ use std::{
 use anyhow::Context;
 use printer::{
     machine::MOTOR_NAMES,
-    planner::{PlanReport, PlanStream},
+    planner::{PlanOptions, PlanReport, PlanStream},
 };
 use serde::Serialize;
 
@@ -27,6 +27,8 @@ use crate::{
 #[derive(Debug, Serialize)]
 struct Report {
     print_time_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bound_s: Option<f64>,
     moves: u64,
     motors: BTreeMap<&'static str, Motor>,
     bytes: u64,
@@ -51,6 +53,7 @@ impl From<&PlanReport> for Report {
         let steps: u64 = plan.motors.iter().map(|motor| motor.steps).sum();
         Self {
             print_time_s: plan.print_time.0,
+            bound_s: plan.bound.map(|bound| bound.0),
             moves: plan.moves,
             motors: motors.collect(),
             bytes: plan.bytes,
@@ -67,7 +70,12 @@ pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
     let mut input = Input::open(&args.file)?;
     let mut dump = args.dump_stream.as_deref().map(Dump::create).transpose()?;
     let progress = Progress::new("planning", input.size());
-    let mut stream = PlanStream::new(&config)?;
+    let options = PlanOptions {
+        feed_scale: args.feed_scale,
+        bound: args.bound,
+        minimum_cruise_ratio: args.minimum_cruise_ratio,
+    };
+    let mut stream = PlanStream::with_options(&config, options)?;
     let mut blocks = Vec::new();
     loop {
         let chunk = input.next(stream.wants())?;
@@ -122,6 +130,14 @@ fn text(report: &Report) -> String {
     let mut text = String::new();
     let time = console::duration_text(report.print_time_s);
     let _ = writeln!(text, "Print time   {time} ({:.2} s)", report.print_time_s);
+    if let Some(bound) = report.bound_s {
+        let ratio = report.print_time_s / bound;
+        let _ = writeln!(
+            text,
+            "Least time   {} ({bound:.2} s), the plan takes {ratio:.5} times that",
+            console::duration_text(bound)
+        );
+    }
     let _ = writeln!(text, "Filament     {:.1} mm", report.filament_mm);
     let _ = writeln!(text, "Moves        {}", report.moves);
     let _ = writeln!(text, "Motor              steps  queue_steps    peak steps/s");

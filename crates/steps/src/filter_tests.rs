@@ -62,8 +62,14 @@ fn state(planned: &[PlannedMove], axis: usize, time: f64) -> (f64, f64, bool) {
         return (one.from[axis], 0.0, false);
     }
     let ratio = one.direction[axis];
-    let slowing = (t - one.accel_time - one.cruise_time).max(0.0);
-    let velocity = one.start_velocity + one.accel * (t.min(one.accel_time) - slowing);
+    let (mut velocity, mut left) = (one.end_velocity, t);
+    for phase in one.phases() {
+        if left < phase.duration {
+            velocity = phase.velocity_at(left);
+            break;
+        }
+        left -= phase.duration;
+    }
     let draws = ratio > 0.0 && (one.direction[0] != 0.0 || one.direction[1] != 0.0);
     (one.from[axis] + ratio * one.distance_at(t), ratio * velocity, draws)
 }
@@ -367,7 +373,7 @@ proptest! {
         for [x, y, length, start_time, accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, accel] in raw {
             let planned = PlannedMove {
                 tag: 0, from: at, to: [x, y, at[2], at[3] + 1.0], direction: [0.6, 0.8, 0.0, 0.1], length, start_time,
-                accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, end_velocity: 0.0, accel,
+                accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, end_velocity: 0.0, accel, shape: None,
             };
             if generator.push(&planned).is_ok() {
                 at = planned.to;

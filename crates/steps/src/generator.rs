@@ -5,7 +5,7 @@ use crate::compressor::{Compressor, gap_min_ticks};
 use crate::crossing::{Grid, Piece, nearest_step};
 use crate::filter::Filter;
 use crate::merge::Merge;
-use crate::segment::Phases;
+use crate::segment::segments;
 use crate::spec::{ERROR_MAX, MotorStats, PushError, SpecError, StepperSpec};
 use crate::stabbing::larger;
 use crate::{AXES, Advance, Cartesian, Kinematics, Segment, Shaper, StepCommand};
@@ -262,7 +262,6 @@ impl<K: Kinematics> StepGenerator<K> {
 
     /// What becomes known of each axis with a move.
     fn push_to_axes(&mut self, planned: &PlannedMove) {
-        let phases = Phases::of(planned);
         let draws = planned.direction[0] != 0.0 || planned.direction[1] != 0.0;
         for (index, (axis, path)) in self.axes.iter_mut().zip(&mut self.paths).enumerate() {
             path.clear();
@@ -270,7 +269,7 @@ impl<K: Kinematics> StepGenerator<K> {
             let Some(filter) = &mut axis.filter else {
                 axis.known = planned.end_time();
                 if from != to {
-                    path.extend(phases.segments(from, to, planned.direction[index]));
+                    segments(planned, from, to, planned.direction[index], &mut |segment| path.push(segment));
                 }
                 continue;
             };
@@ -280,13 +279,13 @@ impl<K: Kinematics> StepGenerator<K> {
                 input.rest_at(planned.end_time(), to);
             } else {
                 let has_advance = index == EXTRUDER && draws && to > from;
-                for segment in phases.segments(from, to, planned.direction[index]) {
+                segments(planned, from, to, planned.direction[index], &mut |segment| {
                     if has_advance {
                         self.advance.apply(&segment, &mut |segment| input.push(segment));
                     } else {
                         input.push(segment);
                     }
-                }
+                });
             }
             filter.drain(path);
             axis.known = filter.known_until();

@@ -78,59 +78,15 @@ fn shifted(powers: &[f64; DEGREE_MAX], t: f64) -> (f64, [f64; DEGREE_MAX]) {
     (way, out)
 }
 
-/// A part of a move in which the jerk along the path does not change.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Phase {
-    start_time: f64,
-    duration: f64,
-    /// Path driven before it, mm.
-    before: f64,
-    /// Path driven in it, from its start: the coefficients of t, t², t³.
-    powers: [f64; 3],
-}
-
-/// The most phases of a move.
-const PHASES_MAX: usize = 3;
-
-/// The phases of one move.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Phases {
-    phases: [Phase; PHASES_MAX],
-    count: usize,
-}
-
-impl Phases {
-    pub(crate) fn of(planned: &PlannedMove) -> Self {
-        let mut phases = Self::default();
-        let mut start_time = planned.start_time;
-        let mut add = |duration: f64, before: f64, velocity: f64, accel: f64| {
-            if duration > 0.0 {
-                let powers = [velocity, 0.5 * accel, 0.0];
-                phases.phases[phases.count] = Phase { start_time, duration, before, powers };
-                phases.count += 1;
-                start_time += duration;
-            }
-        };
-        add(planned.accel_time, 0.0, planned.start_velocity, planned.accel);
-        add(planned.cruise_time, planned.accel_length(), planned.cruise_velocity, 0.0);
-        let before = planned.length - planned.decel_length();
-        add(planned.decel_time, before, planned.cruise_velocity, -planned.accel);
-        phases
-    }
-
-    /// The segments of an axis that goes `ratio` mm for each mm of the path.
-    pub(crate) fn segments(&self, from: f64, to: f64, ratio: f64) -> impl Iterator<Item = Segment> {
-        let phases = &self.phases[..self.count];
-        let mut start = from;
-        phases.iter().enumerate().map(move |(index, phase)| {
-            let next = phases.get(index + 1);
-            let end = next.map_or(to, |next| from + ratio * next.before);
-            let [velocity, half_accel, jerk] = phase.powers.map(|power| power * ratio);
-            let powers = [velocity, half_accel, jerk, 0.0, 0.0];
-            let segment =
-                Segment { start_time: phase.start_time, duration: phase.duration, start, end, powers };
-            start = end;
-            segment
-        })
+/// Appends the path of an axis over a move: it goes `ratio` mm for each mm of the path.
+pub(crate) fn segments(planned: &PlannedMove, from: f64, to: f64, ratio: f64, out: &mut impl FnMut(Segment)) {
+    let mut start_time = planned.start_time;
+    let mut start = from;
+    for phase in planned.phases() {
+        let end = if phase.end_distance == planned.length { to } else { from + ratio * phase.end_distance };
+        let powers = [phase.velocity * ratio, 0.5 * phase.accel * ratio, phase.jerk / 6.0 * ratio, 0.0, 0.0];
+        out(Segment { start_time, duration: phase.duration, start, end, powers });
+        start_time += phase.duration;
+        start = end;
     }
 }

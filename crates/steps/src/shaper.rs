@@ -11,6 +11,7 @@
 
 use core::f64::consts::{PI, SQRT_2};
 use core::ops::RangeInclusive;
+use units::Seconds;
 
 /// The most impulses of a shaper.
 const IMPULSES_MAX: usize = 5;
@@ -113,6 +114,11 @@ impl Shaper {
     /// Weight and time (s, from the first on) of each impulse.
     pub fn impulses(&self) -> &[(f64, f64)] {
         &self.impulses[..self.count]
+    }
+
+    /// From the first impulse to the last.
+    pub fn duration(&self) -> Seconds {
+        Seconds(self.impulses().last().map_or(0.0, |&(_, time)| time))
     }
 
     /// How far ahead each copy of the path looks, and its weight: centred, so that the shaped path is not late.

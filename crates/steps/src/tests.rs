@@ -19,6 +19,9 @@ pub(crate) fn limits() -> Limits {
         minimum_cruise_ratio: 0.5,
         max_z_velocity: MmPerS(15.0),
         max_z_accel: MmPerS2(200.0),
+        max_xy_velocity: Limits::ANY_VELOCITY,
+        max_xy_accel: Limits::ANY_ACCEL,
+        junction_deviation: None,
         extruder: ExtruderLimits::for_nozzle(Mm(0.4), Mm(1.75), MmPerS(300.0), MmPerS2(3000.0)),
     }
 }
@@ -221,7 +224,7 @@ proptest! {
         for [x, y, length, start_time, accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, accel] in raw {
             let planned = PlannedMove {
                 tag: 0, from: at, to: [x, y, at[2], at[3]], direction: [0.6, 0.8, 0.0, 0.0], length, start_time,
-                accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, end_velocity: 0.0, accel,
+                accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, end_velocity: 0.0, accel, shape: None,
             };
             if generator.push(&planned).is_ok() {
                 at = planned.to;
@@ -376,6 +379,7 @@ fn a_motor_that_waits_for_its_neighbour_never_blocks_a_busy_one() {
             cruise_velocity: speed,
             end_velocity: speed,
             accel: 1000.0,
+            shape: None,
         }
     };
     let mut at = [0.0, 0.0125, 0.0, 0.0];

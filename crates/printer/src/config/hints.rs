@@ -10,6 +10,17 @@ pub(super) fn hint(key: &str) -> &'static str {
         "max_z_accel" => "the acceleration of Z in mm/s², e.g. 100",
         "square_corner_velocity" => "the speed at a right-angled corner in mm/s, e.g. 5",
         "minimum_cruise_ratio" => "the share of a short move that must cruise, 0 to below 1, e.g. 0.5",
+        "max_x_velocity" | "max_y_velocity" => "the top speed of that axis in mm/s, e.g. 250",
+        "max_x_accel" | "max_y_accel" => "the acceleration of that axis in mm/s², e.g. 2000",
+        "junction_deviation" => "the distance in mm by which a corner may be missed, e.g. 0.013",
+        "unreachable_speed" => "`clamp` to slow such moves down, or `reject` to refuse them",
+        "pull_out_torque" | "slowing_torque" => {
+            "the motor's torque in N·m at rates in full steps/s, e.g. 0: 2.2, 500: 2.0, 2000: 0.6"
+        }
+        "inertia" => "the inertia of rotor and load in g·cm², as the motor's shaft feels it, e.g. 480",
+        "load_torque" => "the torque of friction at the motor's shaft in N·m, e.g. 0.1",
+        "torque_margin" => "the share of the torque that may be asked for, above 0 to 1, e.g. 0.6",
+        "resonances" => "the bands of full steps/s in which the motor shakes, e.g. 20-40, 90-110",
         "step_pin" | "dir_pin" => "the pin that the motor driver is wired to, e.g. gpio2 or !PA3",
         "enable_pin" => "the driver's enable pin, usually inverted, e.g. !gpio4",
         "endstop_pin" => "the switch's pin, e.g. ^gpio5 with a pull-up, ^!gpio5 where low means closed",

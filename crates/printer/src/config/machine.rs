@@ -22,6 +22,16 @@ pub enum Kinematics {
     Cartesian,
 }
 
+/// What becomes of a move that is faster than its motors' torque allows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UnreachableSpeed {
+    /// It is made as fast as they can, and the user is told.
+    #[default]
+    Clamp,
+    /// It is refused.
+    Reject,
+}
+
 /// `[printer]`: limits of the whole machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineConfig {
@@ -46,6 +56,14 @@ pub struct MachineConfig {
     pub max_z_velocity: MmPerS,
     /// Acceleration of Z; `max_accel` where not given.
     pub max_z_accel: MmPerS2,
+    /// Top speed of X and of Y alone (as in Kalico); infinite where not given.
+    pub max_xy_velocity: [MmPerS; 2],
+    /// Acceleration of X and of Y alone; infinite where not given.
+    pub max_xy_accel: [MmPerS2; 2],
+    /// The other rule for corners (as in Marlin), instead of `square_corner_velocity`.
+    pub junction_deviation: Option<Mm>,
+    /// What becomes of a move that is faster than its motors' torque allows (an option of our own).
+    pub unreachable_speed: UnreachableSpeed,
 }
 
 /// `[idle_timeout]`.
@@ -79,6 +97,8 @@ const STANDBY_TIME_MAX_S: f64 = 14_400.0;
 /// Clear of the part, and back in a second.
 const PAUSE_LIFT_MM: f64 = 5.0;
 const PAUSE_LIFT_MAX_MM: f64 = 100.0;
+/// Beyond a millimetre a corner is none.
+const JUNCTION_DEVIATION_MAX_MM: f64 = 1.0;
 /// At 1 the head could not speed up at all.
 const MINIMUM_CRUISE_RATIO_MAX: f64 = 0.999_999;
 /// A week: longer means "never", which a heater must not have.
@@ -132,7 +152,23 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
     let pause_y = reader.optional_number("pause_y", Range::from(-10_000.0));
     let max_z_velocity = reader.optional_number("max_z_velocity", Range::above(0.0).to(VELOCITY_MAX));
     let max_z_accel = reader.optional_number("max_z_accel", Range::above(0.0).to(ACCEL_MAX));
+    let velocity = Range::above(0.0).to(VELOCITY_MAX);
+    let xy_velocity = ["max_x_velocity", "max_y_velocity"].map(|name| reader.optional_number(name, velocity));
+    let accel = Range::above(0.0).to(ACCEL_MAX);
+    let xy_accel = ["max_x_accel", "max_y_accel"].map(|name| reader.optional_number(name, accel));
+    let junction_deviation =
+        reader.optional_number("junction_deviation", Range::from(0.0).to(JUNCTION_DEVIATION_MAX_MM));
+    let unreachable_speed = match reader.text("unreachable_speed").as_deref() {
+        None | Some("clamp") => Ok(UnreachableSpeed::Clamp),
+        Some("reject") => Ok(UnreachableSpeed::Reject),
+        Some(other) => {
+            let problem = format!("`{}` is neither `clamp` nor `reject`", excerpt(other));
+            Err(reader.error("unreachable_speed", problem))
+        }
+    };
     reader.finish();
+    let [max_x_velocity, max_y_velocity] = xy_velocity;
+    let [max_x_accel, max_y_accel] = xy_accel;
     let (max_velocity, max_accel) = (max_velocity?, max_accel?);
     old_decel?;
     Ok(MachineConfig {
@@ -147,6 +183,10 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
         // As in Klipper, the whole machine's limits hold for Z too.
         max_z_velocity: MmPerS(max_z_velocity?.unwrap_or(max_velocity).min(max_velocity)),
         max_z_accel: MmPerS2(max_z_accel?.unwrap_or(max_accel).min(max_accel)),
+        max_xy_velocity: [max_x_velocity?, max_y_velocity?].map(|it| MmPerS(it.unwrap_or(f64::INFINITY))),
+        max_xy_accel: [max_x_accel?, max_y_accel?].map(|it| MmPerS2(it.unwrap_or(f64::INFINITY))),
+        junction_deviation: junction_deviation?.map(Mm),
+        unreachable_speed: unreachable_speed?,
     })
 }
 

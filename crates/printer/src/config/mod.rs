@@ -17,14 +17,19 @@ mod reader;
 mod rest;
 mod stepper;
 mod thermal;
+mod torque;
 
 pub use diagnostics::{CONFIG_DIAGNOSTICS_MAX, ConfigDiagnostic, Severity};
 pub use document::CONFIG_BYTES_MAX;
 pub use dynamics::AxisShaperConfig;
-pub use machine::{FirmwareRetraction, IdleTimeoutConfig, Kinematics, MachineConfig, McuConfig};
+pub use machine::{
+    FirmwareRetraction, IdleTimeoutConfig, Kinematics, MachineConfig, McuConfig, UnreachableSpeed,
+};
 pub use pin::{PinSpec, Pull};
 pub use stepper::{MotorConfig, StepperConfig};
 pub use thermal::{ControlConfig, ExtruderConfig, FanConfig, HeaterConfig};
+
+use motion::MotorAbility;
 
 use diagnostics::Log;
 use reader::{Checked, PinRegistry, Reader, Reported};
@@ -50,11 +55,19 @@ pub struct PrinterConfig {
     pub input_shaper: [AxisShaperConfig; 2],
     /// `[firmware_retraction]`: what G10 and G11 do; none where the section is missing.
     pub firmware_retraction: Option<FirmwareRetraction>,
+    /// `[motor_torque …]` of X, Y, Z and the extruder: what a motor can do at each speed, where that is known.
+    pub abilities: [Option<MotorAbility>; 4],
     /// `[force_move] enable_force_move`: positions may be set by hand.
     pub force_move: bool,
 }
 
 impl PrinterConfig {
+    /// How far an input shaper may move an axis from when its move does.
+    pub fn shaper_reach(&self) -> units::Seconds {
+        let reaches = self.input_shaper.iter().filter_map(AxisShaperConfig::shaper);
+        units::Seconds(reaches.map(|shaper| shaper.duration().0).fold(0.0, f64::max))
+    }
+
     /// Every heater of the machine.
     pub fn heaters(&self) -> impl Iterator<Item = &HeaterConfig> {
         self.extruder.iter().map(|extruder| &extruder.heater).chain(&self.heater_bed)
@@ -119,6 +132,11 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
     let input_shaper = dynamics::input_shaper(&mut builder);
     let firmware_retraction = machine::firmware_retraction(&mut builder);
     let force_move = machine::force_move(&mut builder);
+    let motors = [&x, &y, &z].map(|axis| axis.as_ref().ok().map(|axis| axis.motor.clone()));
+    let feeder = extruder.as_ref().ok().and_then(Option::as_ref).map(|extruder| extruder.motor.clone());
+    let [mx, my, mz] = motors;
+    let motors = [("stepper_x", mx), ("stepper_y", my), ("stepper_z", mz), ("extruder", feeder)];
+    let abilities = motors.map(|(name, motor)| torque::motor_torque(&mut builder, name, motor.as_ref()));
     rest::report(builder.document.into_rest(), builder.log);
     Ok(PrinterConfig {
         mcu: mcu?,
@@ -130,6 +148,10 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
         idle_timeout: idle_timeout?,
         input_shaper: input_shaper?,
         firmware_retraction: firmware_retraction?,
+        abilities: {
+            let [x, y, z, e] = abilities;
+            [x?, y?, z?, e?]
+        },
         force_move: force_move?,
     })
 }

@@ -354,3 +354,48 @@ proptest! {
         }
     }
 }
+
+const TORQUE: &str =
+    "\n[motor_torque stepper_x]\npull_out_torque: 0: 2.2, 400: 2.1,\n  2000: 0.6\ninertia: 480\n";
+
+#[test]
+fn a_motor_s_torque_is_read_into_what_its_axis_can_do() {
+    let (config, diagnostics) = parse(&with("", &format!("{TORQUE}load_torque: 0.1\nresonances: 20-40\n")));
+    assert!(diagnostics.is_empty(), "{diagnostics:#?}");
+    let abilities = config.unwrap().abilities;
+    assert!(abilities[1..].iter().all(Option::is_none));
+    let x = abilities[0].as_ref().unwrap();
+    // 0.6·0.6 N·m are left at 2000 steps/s, which are 400 mm/s; nothing beyond is known.
+    assert_eq!(x.top(), MmPerS(400.0));
+    let accel = x.accel_at(MmPerS(0.0), motion::Demand::Speed).0;
+    let exact = (0.6 * 2.2 - 0.1) / 480e-7 * 40.0 / core::f64::consts::TAU;
+    assert!((0.97..=1.0).contains(&(accel / exact)), "{accel} {exact}");
+}
+
+#[test]
+fn a_resolution_that_the_load_makes_unreal_is_told() {
+    let (config, diagnostics) = parse(&with("", &format!("{TORQUE}load_torque: 0.3\n")));
+    assert!(config.is_some());
+    // A sixteenth has 9.80 % of 2.2 N·m; an eighth has 19.51 %.
+    let text = &diagnostics[0].message;
+    assert!(text.contains("9.80 %") && text.contains("1/8"), "{text}");
+}
+
+#[test]
+fn a_torque_that_no_motor_has_is_told_with_its_line() {
+    for (wrong, said) in [
+        ("pull_out_torque: 0: 2.2, x", "not a pair"),
+        ("pull_out_torque: 10: 2.2, 20: 1", "must start at 0"),
+        ("pull_out_torque: 0: 2.2, 400: 2.1\nload_torque: 2", "leaves nothing"),
+        ("pull_out_torque: 0: 2.2, 400: 2.1\nresonances: 40-20", "not a band"),
+        ("pull_out_torque: 0: 2.2, 400: 2.1\ntorque_margin: 1.2", "at most 1"),
+    ] {
+        let text = with("", &format!("\n[motor_torque stepper_x]\n{wrong}\ninertia: 480\n"));
+        let (config, diagnostics) = parse(&text);
+        assert!(config.is_none(), "{wrong}");
+        assert!(
+            diagnostics.iter().any(|it| it.message.contains(said) && it.line > 0),
+            "{wrong}: {diagnostics:#?}"
+        );
+    }
+}

@@ -17,20 +17,20 @@ mod tests;
 use std::collections::VecDeque;
 
 use gcode::{Action, Diagnostic, DiagnosticCode, LineNumber, Move, Severity, VelocityLimit, Wait};
-use motion::{Limits, LookAhead, MoveRequest, PlannedMove};
+use motion::{Bound, Limits, LookAhead, MoveRequest, PlannedMove};
 use steps::{PushError, StepGenerator};
 use units::{Hertz, MmPerS, Seconds, Ticks};
 
 use dynamics::Course;
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
-pub use report::{MotorReport, PLAN_CLOCK, PlanReport, PlanStream};
+pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanStream};
 pub(crate) use skip::{Skip, Skipped};
 pub(crate) use source::Next;
 pub use source::{SOURCE_BYTES_MAX, Source};
 
 use crate::{
-    config::PrinterConfig,
+    config::{PrinterConfig, UnreachableSpeed},
     error::{ErrorCode, PrinterError},
     machine::{self, EXTRUDER},
     step_rate::StepRates,
@@ -69,6 +69,7 @@ const DWELL_IN_RUN_MAX: Seconds = Seconds(2.0);
 struct Said {
     other_fans: bool,
     slowed: bool,
+    clamped: bool,
 }
 
 /// Turns G-code into step commands.
@@ -95,14 +96,17 @@ pub struct Planner {
     said: Said,
     course: Course,
     step_rates: StepRates,
+    unreachable_speed: UnreachableSpeed,
     is_broken: bool,
+    /// What the plan is held against, where somebody wants to know.
+    bound: Option<Box<Bound>>,
 }
 
 impl Planner {
     /// A planner for a machine and a board's clock. No axis is homed, and the machine stands at 0, 0, 0.
     pub fn new(config: &PrinterConfig, clock: Hertz) -> Result<Self, PrinterError> {
         let limits = machine::limits(config);
-        let look_ahead = LookAhead::new(limits)
+        let look_ahead = LookAhead::with_motors(limits, config.abilities.to_vec())
             .map_err(|error| PrinterError::new(ErrorCode::ConfigInvalid, error.to_string()))?;
         Ok(Self {
             guard: Guard::new(config),
@@ -123,8 +127,15 @@ impl Planner {
             said: Said::default(),
             course: Course::new(config),
             step_rates: StepRates::new(config, clock),
+            unreachable_speed: config.printer.unreachable_speed,
             is_broken: false,
+            bound: None,
         })
+    }
+
+    /// Works out the least time that the motion could take, beside the plan.
+    fn bound(&mut self, config: &PrinterConfig) {
+        self.bound = Some(Box::new(Bound::new(config.abilities.to_vec())));
     }
 
     /// Where the last accepted move ends.
@@ -210,6 +221,7 @@ impl Planner {
         let is_active = self.run == Run::Active;
         if is_active {
             self.look_ahead.flush();
+            self.bound.iter_mut().for_each(|bound| bound.stop());
             self.run = Run::Ending;
         }
         is_active
@@ -326,6 +338,7 @@ impl Planner {
             Action::Home { x, y, z } => self.barrier = Some((line, Barrier::Home([x, y, z]))),
             Action::Dwell(pause) if self.run == Run::Active && pause <= DWELL_IN_RUN_MAX => {
                 self.look_ahead.dwell(pause);
+                self.bound.iter_mut().for_each(|bound| bound.dwell(pause));
                 self.dwelt_until = self.look_ahead.print_time();
             }
             Action::Dwell(pause) => self.barrier = Some((line, Barrier::Dwell(pause))),
@@ -417,6 +430,7 @@ impl Planner {
         let from = gcode::Position { x, y, z, e: e - e_offset };
         self.guard.judge(&Move { from, ..*mv })?;
         let feed = self.feed(mv, to, source);
+        self.judge_torque(to, feed, mv.line)?;
         self.push(to, feed, mv.line)
     }
 
@@ -430,6 +444,29 @@ impl Planner {
             self.notice(mv.line, "a move is made slower than the factor asks: a motor cannot step faster");
         }
         feed
+    }
+
+    /// A move that is faster than its motors' torque allows is slowed down by the look-ahead: the user is told, or it is
+    /// refused, as the machine file says.
+    fn judge_torque(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
+        if to == self.position || self.said.clamped {
+            return Ok(());
+        }
+        let found = self.step_rates.out_of_torque(self.position, to, feed, &self.limits);
+        let Some((motor, speed, top)) = found else { return Ok(()) };
+        let name = machine::MOTOR_NAMES[motor];
+        if self.unreachable_speed == UnreachableSpeed::Reject {
+            let detail = format!("{name} at {:.0} mm/s, its torque lasts up to {:.0} mm/s", speed.0, top.0);
+            return Err(PrinterError::new(ErrorCode::StepRateTooHigh, detail).at_line(line.0));
+        }
+        self.said.clamped = true;
+        let text = format!(
+            "moves are made slower than the file asks: {name} would have to go {:.0} mm/s, and its torque lasts up to \
+             {:.0} mm/s",
+            speed.0, top.0
+        );
+        self.notice(line, &text);
+        Ok(())
     }
 
     fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
@@ -454,6 +491,9 @@ impl Planner {
         // The look-ahead drops moves without length.
         self.moves_pushed += (self.look_ahead.len() - before) as u64;
         self.position = to;
+        if let Some(bound) = &mut self.bound {
+            bound.push(&request, &self.limits);
+        }
         Ok(())
     }
 

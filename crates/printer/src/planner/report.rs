@@ -44,6 +44,25 @@ pub struct PlanReport {
     pub step_error_max: Seconds,
     /// Filament pushed less filament pulled back, in mm.
     pub filament_mm: f64,
+    /// The least time that the same moves could take under the same limits, where it was asked for.
+    pub bound: Option<Seconds>,
+}
+
+/// What a plan may differ in from what would be printed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanOptions {
+    /// Every feed of the file is multiplied by this.
+    pub feed_scale: f64,
+    /// Work out the least time too.
+    pub bound: bool,
+    /// The machine's minimum cruise ratio, where another is wanted.
+    pub minimum_cruise_ratio: Option<f64>,
+}
+
+impl Default for PlanOptions {
+    fn default() -> Self {
+        Self { feed_scale: 1.0, bound: false, minimum_cruise_ratio: None }
+    }
 }
 
 /// Plans a source without a board and packs the step commands into the blocks that would be sent. Homing takes no time
@@ -55,21 +74,38 @@ pub struct PlanStream {
     payload: Vec<u8>,
     sequence: u8,
     report: PlanReport,
+    /// Waits of the file outside of any run of motion.
+    dwelt: Seconds,
 }
 
 impl PlanStream {
     /// A plan for a machine.
     pub fn new(config: &PrinterConfig) -> Result<Self, PrinterError> {
+        Self::with_options(config, PlanOptions::default())
+    }
+
+    /// A plan for a machine that differs from what would be printed.
+    pub fn with_options(config: &PrinterConfig, options: PlanOptions) -> Result<Self, PrinterError> {
+        let mut config = config.clone();
+        if let Some(ratio) = options.minimum_cruise_ratio {
+            config.printer.minimum_cruise_ratio = ratio;
+        }
+        let config = &config;
         let mut planner = Planner::new(config, PLAN_CLOCK)?;
+        if options.bound {
+            planner.bound(config);
+        }
         planner.guard.extrusion = super::ExtrusionPermit::Allowed;
         let mut source = Source::new(machine::gcode_settings(config));
         planner.adopt(&mut source);
+        source.interpreter.set_speed_factor(options.feed_scale);
         Ok(Self {
             planner,
             source,
             payload: Vec::with_capacity(PAYLOAD_BYTES_MAX),
             sequence: 0,
             report: PlanReport::default(),
+            dwelt: Seconds::ZERO,
         })
     }
 
@@ -107,6 +143,7 @@ impl PlanStream {
             };
             self.report.step_error_max = self.report.step_error_max.max(stats.max_error);
         }
+        self.report.bound = self.planner.bound.as_ref().map(|bound| bound.total() + self.dwelt);
         Ok(self.report)
     }
 
@@ -145,7 +182,10 @@ impl PlanStream {
                 let at = |axis: usize| axes[axis].then_some(0.0);
                 self.source.interpreter.set_axes(at(0), at(1), at(2));
             }
-            Barrier::Dwell(duration) => self.report.print_time += *duration,
+            Barrier::Dwell(duration) => {
+                self.report.print_time += *duration;
+                self.dwelt += *duration;
+            }
             Barrier::WaitTemperature { .. }
             | Barrier::MotorsOff(_)
             | Barrier::WaitForMoves

@@ -51,7 +51,10 @@ fn plan(text: &str) -> Vec<Planned> {
 }
 
 fn moves(items: &[Planned]) -> Vec<PlannedMove> {
-    items.iter().filter_map(|item| if let Planned::Move(mv) = item { Some(*mv) } else { None }).collect()
+    items
+        .iter()
+        .filter_map(|item| if let Planned::Move(mv) = item { Some(mv.clone()) } else { None })
+        .collect()
 }
 
 fn timed(items: &[Planned]) -> Vec<(f64, u32, TimedAction)> {
@@ -301,11 +304,56 @@ fn what_a_factor_makes_too_fast_for_a_motor_is_slowed_down_and_what_the_file_ask
     assert_eq!(plan("M220 S100", 12_000), Err(ErrorCode::StepRateTooHigh));
     for factors in ["M220 S300", "M220 S200\nM221 S102"] {
         let items = plan(factors, 7200).unwrap();
-        let filament = moves(&items)[0];
+        let filament = &moves(&items)[0];
         let speed = filament.cruise_velocity * filament.direction[EXTRUDER].abs();
         assert!((speed - slowest.0).abs() < 1e-6 * slowest.0, "{speed} mm/s of {slowest:?}");
         let said =
             |item: &&Planned| matches!(item, Planned::Notice(notice) if notice.message.contains("slower"));
         assert_eq!(items.iter().filter(said).count(), 1);
     }
+}
+
+/// The sample machine whose motor of X lasts up to 200 mm/s.
+fn weak_machine(policy: &str) -> (Planner, Source) {
+    let text =
+        include_str!("../../../../samples/printer.cfg").replace("[printer]", &format!("[printer]\n{policy}"));
+    let torque = "\n[motor_torque stepper_x]\npull_out_torque: 0: 0.4, 1000: 0.2\ninertia: 100\n";
+    let (config, diagnostics) = config::parse(&format!("{text}{torque}"));
+    let mut planner = Planner::new(&config.unwrap_or_else(|| panic!("{diagnostics:?}")), CLOCK).unwrap();
+    (0..3).for_each(|axis| planner.set_axis(axis, 0.0, true));
+    let mut source = Source::default();
+    planner.begin_job(&mut source);
+    (planner, source)
+}
+
+#[test]
+fn what_a_motor_s_torque_does_not_last_for_is_slowed_down_and_told_once() {
+    let (mut planner, mut source) = weak_machine("");
+    let top = planner.step_rates.out_of_torque([0.0; 4], [9.0, 0.0, 0.0, 0.0], MmPerS(1e6), &planner.limits);
+    let top = top.unwrap().2.0;
+    feed(&mut source, "G1 X50 F3000\nG1 X150 F18000\nG1 X0\n");
+    let items = items(&mut planner, &mut source);
+    let notices: Vec<_> = items
+        .iter()
+        .filter_map(|item| if let Planned::Notice(it) = item { Some(it) } else { None })
+        .collect();
+    assert_eq!(notices.len(), 1, "{notices:?}");
+    assert!(notices[0].line == LineNumber(2) && notices[0].message.contains("stepper_x"), "{notices:?}");
+    let speeds: Vec<f64> = moves(&items).iter().map(|mv| mv.cruise_velocity).collect();
+    assert!((speeds[0] - 50.0).abs() < 1e-9 && speeds[1] <= top && speeds[1] > 0.5 * top, "{speeds:?} {top}");
+}
+
+#[test]
+fn it_is_refused_where_the_machine_file_says_so() {
+    let (mut planner, mut source) = weak_machine("unreachable_speed: reject");
+    feed(&mut source, "G1 X50 F3000\nG1 X150 F18000\n");
+    let error = loop {
+        match planner.next(&mut source) {
+            Ok(Planned::EndOfSource) => panic!("it was made"),
+            Ok(_) => {}
+            Err(error) => break error,
+        }
+    };
+    assert_eq!(error.code, ErrorCode::StepRateTooHigh);
+    assert!(error.to_string().contains("stepper_x"), "{error}");
 }

@@ -1,0 +1,226 @@
+//! Motors whose strength depends on speed: what is asked of them, and how near to the best that comes.
+
+use crate::motor::{Demand, Torque};
+use crate::{ExtruderLimits, Limits, LookAhead, MotorAbility, MoveRequest, PlannedMove};
+use core::f64::consts::TAU;
+use proptest::prelude::*;
+use units::{Mm, MmPerS, MmPerS2};
+
+/// A large frame's motor: 200 full steps and 40 mm a turn.
+fn torque() -> Torque {
+    Torque {
+        pull_out: vec![(0.0, 2.2), (400.0, 2.1), (1000.0, 1.4), (2000.0, 0.7), (4000.0, 0.2)],
+        pull_out_slowing: None,
+        load: 0.15,
+        inertia: 4.0e-4,
+        margin: 0.6,
+        full_steps: 200,
+        turn: Mm(40.0),
+        resonances: Vec::new(),
+    }
+}
+
+fn limits() -> Limits {
+    Limits {
+        max_velocity: MmPerS(2000.0),
+        max_accel: MmPerS2(100_000.0),
+        square_corner_velocity: MmPerS(5.0),
+        minimum_cruise_ratio: 0.0,
+        max_z_velocity: MmPerS(2000.0),
+        max_z_accel: MmPerS2(100_000.0),
+        max_xy_velocity: Limits::ANY_VELOCITY,
+        max_xy_accel: Limits::ANY_ACCEL,
+        junction_deviation: None,
+        extruder: ExtruderLimits::for_nozzle(Mm(0.4), Mm(1.75), MmPerS(2000.0), MmPerS2(100_000.0)),
+    }
+}
+
+fn motors(torque: &Torque) -> Vec<Option<MotorAbility>> {
+    let ability = torque.ability().unwrap();
+    vec![Some(ability.clone()), Some(ability), None, None]
+}
+
+fn plan(torque: &Torque, points: &[([f64; 4], f64)], limits: Limits) -> Vec<PlannedMove> {
+    let mut look_ahead = LookAhead::with_motors(limits, motors(torque)).unwrap();
+    let mut from = [0.0; 4];
+    for (tag, &(to, feed)) in points.iter().enumerate() {
+        look_ahead.push(&MoveRequest { from, to, feed: MmPerS(feed), tag: tag as u32 }).unwrap();
+        from = to;
+    }
+    look_ahead.flush();
+    std::iter::from_fn(|| look_ahead.pop()).collect()
+}
+
+/// Torque of the table at a rate.
+fn table(torque: &Torque, rate: f64) -> f64 {
+    let points = &torque.pull_out;
+    let after = points.iter().position(|point| point.0 >= rate).unwrap_or(points.len() - 1).max(1);
+    let [(f0, t0), (f1, t1)] = [points[after - 1], points[after]];
+    t0 + (t1 - t0) * (rate - f0) / (f1 - f0)
+}
+
+/// What the motors of the axes x and y are asked for at every moment: never more than the margin leaves.
+fn check_torque(torque: &Torque, planned: &PlannedMove) {
+    let steps_mm = f64::from(torque.full_steps) / torque.turn.0;
+    let step_rad = TAU / f64::from(torque.full_steps);
+    for phase in planned.phases() {
+        for part in 0..=8 {
+            let time = phase.duration * f64::from(part) / 8.0;
+            for axis in 0..2 {
+                let speed = phase.velocity_at(time) * planned.direction[axis].abs();
+                let accel = phase.accel * planned.direction[axis].abs();
+                let rate = speed * steps_mm;
+                // Friction helps to slow down.
+                let asked = torque.inertia * accel * steps_mm * step_rad + torque.load;
+                let has = torque.margin * table(torque, rate);
+                let is_moving = planned.direction[axis] != 0.0;
+                assert!(
+                    !is_moving || phase.accel <= 0.0 || asked <= has * (1.0 + 1e-9),
+                    "{asked} of {has} at {rate}"
+                );
+                assert!(
+                    !is_moving || phase.accel >= 0.0 || -asked <= has * (1.0 + 1e-9),
+                    "{asked} of {has} at {rate}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_long_move_goes_to_the_top_that_the_torque_leaves_and_no_further() {
+    let torque = torque();
+    let ability = torque.ability().unwrap();
+    let planned = plan(&torque, &[([3000.0, 0.0, 0.0, 0.0], 5000.0)], limits());
+    assert!((planned[0].cruise_velocity - ability.top().0).abs() < 1e-9);
+    // Below 4000 steps/s, at which 0.6 times 0.2 N·m does not overcome the load.
+    assert!(ability.top().0 < 800.0 && ability.top().0 > 600.0, "{:?}", ability.top());
+    check_torque(&torque, &planned[0]);
+    // Slowing down is stronger, and shorter.
+    assert!(planned[0].decel_time < planned[0].accel_time);
+    let driven: f64 =
+        planned[0].phases().map(|phase| phase.distance_at(phase.duration) - phase.start_distance).sum();
+    assert!((driven - 3000.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_diagonal_asks_each_motor_for_its_share() {
+    let torque = torque();
+    let straight = plan(&torque, &[([3000.0, 0.0, 0.0, 0.0], 5000.0)], limits());
+    let diagonal = plan(&torque, &[([3000.0, 3000.0, 0.0, 0.0], 5000.0)], limits());
+    let root = 2.0_f64.sqrt();
+    assert!((diagonal[0].cruise_velocity - root * straight[0].cruise_velocity).abs() < 1e-6);
+    assert!((diagonal[0].duration() - straight[0].duration()).abs() < 1e-6);
+    check_torque(&torque, &diagonal[0]);
+}
+
+#[test]
+fn the_time_of_a_ramp_is_the_integral_over_the_torque_that_is_left() {
+    // t(f₁) = J·∫ dω/(T − T_L), by the midpoint rule over the lines of the table.
+    let torque = Torque { load: 0.1, ..torque() };
+    let planned = plan(&torque, &[([3000.0, 0.0, 0.0, 0.0], 300.0)], limits());
+    let step_rad = TAU / 200.0;
+    let (from, to) = (planned[0].start_velocity * 5.0, 300.0 * 5.0);
+    let parts = 100_000;
+    let width = (to - from) / f64::from(parts);
+    let exact: f64 = (0..parts)
+        .map(|part| {
+            let rate = from + (f64::from(part) + 0.5) * width;
+            torque.inertia * step_rad * width / (torque.margin * table(&torque, rate) - torque.load)
+        })
+        .sum();
+    let ratio = planned[0].accel_time / exact;
+    assert!((1.0..1.01).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn nothing_cruises_in_a_band_of_resonance() {
+    // 20 ..= 40 steps/s are 4 ..= 8 mm/s.
+    let torque = Torque { resonances: vec![(20.0, 40.0), (39.0, 60.0)], ..torque() };
+    let slow = plan(&torque, &[([100.0, 0.0, 0.0, 0.0], 6.0)], limits());
+    assert!((slow[0].cruise_velocity - 4.0).abs() < 1e-9);
+    let both = plan(&torque, &[([100.0, 0.0, 0.0, 0.0], 11.0)], limits());
+    assert!((both[0].cruise_velocity - 4.0).abs() < 1e-9);
+    let above = plan(&torque, &[([100.0, 0.0, 0.0, 0.0], 100.0)], limits());
+    assert!((above[0].cruise_velocity - 100.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_no_motor_has_is_refused() {
+    for wrong in [
+        Torque { load: 3.0, ..torque() },
+        Torque { inertia: 0.0, ..torque() },
+        Torque { margin: 1.5, ..torque() },
+        Torque { margin: f64::NAN, ..torque() },
+        Torque { pull_out: vec![(0.0, 1.0)], ..torque() },
+        Torque { pull_out: vec![(1.0, 1.0), (2.0, 1.0)], ..torque() },
+        Torque { pull_out: vec![(0.0, 1.0), (0.0, 1.0)], ..torque() },
+        Torque { pull_out: vec![(0.0, 1.0), (f64::INFINITY, 1.0)], ..torque() },
+        Torque { resonances: vec![(0.0, 1.0)], ..torque() },
+    ] {
+        assert!(wrong.ability().is_err(), "{wrong:?}");
+    }
+}
+
+fn any_torque() -> impl Strategy<Value = Torque> {
+    let points = proptest::collection::vec((1.0..2000.0_f64, 0.0..3.0_f64), 1..8);
+    (points, 0.0..0.3_f64, 1e-5..1e-2_f64, 0.3..0.9_f64, 0.5..3.0_f64).prop_map(
+        |(steps, load, inertia, margin, first)| {
+            let mut rate = 0.0;
+            let mut pull_out = vec![(0.0, first)];
+            for (gap, torque) in steps {
+                rate += gap;
+                pull_out.push((rate, torque));
+            }
+            Torque { pull_out, load, inertia, margin, ..torque() }
+        },
+    )
+}
+
+proptest! {
+    #[test]
+    fn no_motor_is_ever_asked_for_more_than_it_has(
+        torque in any_torque(),
+        points in proptest::collection::vec((-200.0..200.0_f64, -200.0..200.0_f64, 5.0..2000.0_f64), 1..40),
+    ) {
+        let Ok(ability) = torque.ability() else { return Ok(()) };
+        let points: Vec<_> = points.iter().map(|&(x, y, feed)| ([x, y, 0.0, 0.0], feed)).collect();
+        let planned = plan(&torque, &points, limits());
+        let mut at = 0.0;
+        let mut before: Option<&PlannedMove> = None;
+        for one in &planned {
+            check_torque(&torque, one);
+            prop_assert!((one.start_time - at).abs() < 1e-9);
+            at = one.end_time();
+            let mut speed = one.start_velocity;
+            let mut distance = 0.0;
+            for phase in one.phases() {
+                prop_assert!((phase.velocity - speed).abs() < 1e-6);
+                prop_assert!((phase.start_distance - distance).abs() < 1e-9);
+                speed = phase.velocity_at(phase.duration);
+                distance = phase.end_distance;
+                prop_assert!((phase.distance_at(phase.duration) - distance).abs() < 1e-6);
+            }
+            prop_assert!((speed - one.end_velocity).abs() < 1e-6);
+            prop_assert_eq!(distance, one.length);
+            for axis in 0..2 {
+                let jump = one.start_velocity * one.direction[axis]
+                    - before.map_or(0.0, |before| before.end_velocity * before.direction[axis]);
+                prop_assert!(jump.abs() <= ability.start().0 * (1.0 + 1e-9), "{} {:?}", jump, ability.start());
+            }
+            before = Some(one);
+        }
+    }
+
+    #[test]
+    fn the_staircase_lies_below_the_line_and_near_it(torque in any_torque(), share in 0.0..1.0_f64) {
+        let Ok(ability) = torque.ability() else { return Ok(()) };
+        let speed = ability.top().0 * share;
+        let steps_mm = f64::from(torque.full_steps) / torque.turn.0;
+        let left = torque.margin * table(&torque, speed * steps_mm) - torque.load;
+        let exact = left / torque.inertia * torque.turn.0 / TAU;
+        let stair = ability.accel_at(MmPerS(speed), Demand::Speed).0;
+        prop_assert!(stair <= exact * (1.0 + 1e-9) + 1e-9);
+        prop_assert!(stair >= exact * 0.96 - 1e-9, "{} {}", stair, exact);
+    }
+}
