@@ -214,6 +214,8 @@ pub enum Action {
         /// Over which it is smoothed.
         smooth_time: Option<Seconds>,
     },
+    /// Input shapers (`SET_INPUT_SHAPER`).
+    InputShaper(InputShaper),
     /// The speed factor is now this (`M220`); moves that follow have it in their feed.
     SpeedFactor(f64),
     /// The flow factor is now this (`M221`); moves that follow have it in their `e`.
@@ -236,4 +238,42 @@ pub enum Action {
     Pause(PauseReason),
     /// End the print here (`CANCEL_PRINT`).
     Cancel,
+}
+
+/// New input shapers of X and Y.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InputShaper {
+    /// X.
+    pub x: AxisShaper,
+    /// Y.
+    pub y: AxisShaper,
+}
+
+/// What becomes of one axis' input shaper; `None` leaves one thing as it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisShaper {
+    /// Which shaper.
+    pub kind: Option<ShaperName>,
+    /// The resonance's frequency in Hz; 0 is off.
+    pub frequency: Option<f64>,
+    /// The resonance's damping, as a share of the critical damping.
+    pub damping_ratio: Option<f64>,
+}
+
+/// The name of an input shaper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ShaperName(&'static str);
+
+impl ShaperName {
+    const ALL: [&'static str; 6] = ["zv", "mzv", "zvd", "ei", "2hump_ei", "3hump_ei"];
+
+    /// The shaper of that name, in any case.
+    pub fn new(name: &[u8]) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.as_bytes().eq_ignore_ascii_case(name)).map(Self)
+    }
+
+    /// The name, in lower case.
+    pub const fn name(self) -> &'static str {
+        self.0
+    }
 }

@@ -5,7 +5,7 @@
 
 use gcode::LineNumber;
 use motion::{Limits, PlannedMove};
-use units::{Hertz, MmPerS};
+use units::{Hertz, MmPerS, Seconds};
 
 use crate::{
     config::PrinterConfig,
@@ -21,6 +21,8 @@ const SLACK: f64 = 1e-9;
 #[derive(Clone, Copy, Debug)]
 pub struct StepRates {
     speed_max: [MmPerS; MOTORS],
+    /// Pressure advance adds so much to the filament's speed, mm/s a mm/s² of its acceleration.
+    advance: Seconds,
     /// Where each motor's torque ends, where that is known.
     torque_tops: [Option<MmPerS>; MOTORS],
 }
@@ -28,8 +30,10 @@ pub struct StepRates {
 impl StepRates {
     /// Of a machine on a board with this clock.
     pub fn new(config: &PrinterConfig, clock: Hertz) -> Self {
+        let advance = config.extruder.as_ref().map_or(Seconds::ZERO, |extruder| extruder.advance.slope_max());
         Self {
             speed_max: machine::motor_speeds_max(config, clock),
+            advance,
             torque_tops: config.abilities.each_ref().map(|it| it.as_ref().map(motion::MotorAbility::top)),
         }
     }
@@ -61,6 +65,11 @@ impl StepRates {
             let speed = (feed * (delta[motor] / length)).min(bounds[motor]);
             (speed > top * (1.0 + SLACK)).then_some((motor, speed, top))
         })
+    }
+
+    /// Another pressure advance holds, which adds so much.
+    pub const fn set_advance(&mut self, advance: Seconds) {
+        self.advance = advance;
     }
 
     /// Refuses what no driver can step, by the highest speed that the limits leave. An extruder that moves along with
@@ -103,9 +112,13 @@ impl StepRates {
     }
 
     /// Refuses a planned move in which a motor would have to step faster than it can.
+    /// Where it draws, pressure advance adds to the filament's speed.
     pub fn judge_planned(&self, planned: &PlannedMove) -> Result<(), PrinterError> {
+        let draws =
+            planned.direction[EXTRUDER] > 0.0 && (planned.direction[0] != 0.0 || planned.direction[1] != 0.0);
         for motor in 0..MOTORS {
-            let speed = MmPerS(planned.cruise_velocity * planned.direction[motor].abs());
+            let added = if draws && motor == EXTRUDER { self.advance.0 * planned.accel } else { 0.0 };
+            let speed = MmPerS((planned.cruise_velocity + added) * planned.direction[motor].abs());
             if speed > self.speed_max[motor] * (1.0 + SLACK) {
                 return Err(too_fast(motor, speed, planned.tag));
             }

@@ -1,125 +1,75 @@
 //! Planned moves in, commands for all motors out, in the order of time.
 
+use crate::advance::Lines;
 use crate::compressor::{Compressor, gap_min_ticks};
 use crate::crossing::{Grid, Piece, nearest_step};
+use crate::filter::Filter;
+use crate::merge::Merge;
+use crate::segment::segments;
+use crate::spec::{ERROR_MAX, MotorStats, PushError, SpecError, StepperSpec};
 use crate::stabbing::larger;
-use crate::{Cartesian, Kinematics, MotorSegment, StepCommand};
+use crate::{AXES, Advance, Cartesian, Kinematics, Segment, Shaper, StepCommand};
 use motion::{PlannedMove, RUN_TIME_MAX};
 use std::collections::VecDeque;
-use thiserror::Error;
-use units::{Hertz, Mm, Seconds, StepCount, Ticks};
+use units::{Hertz, Seconds, StepCount, Ticks};
 
 /// The most stretches of one motor's path that wait to be turned into steps.
 pub const PIECES_MAX: usize = 4096;
 /// Steps of one motor that are generated before the others get their turn.
-const TURN_STEPS: u32 = 256;
+const TURN_STEPS: u64 = 256;
+/// The axis that pressure advance is for.
+const EXTRUDER: usize = 3;
 /// Positions are below this many steps: beyond it a float's half steps blur.
 const POSITION_STEPS_MAX: f64 = 1e15;
 /// A move must start this close (mm) to where the one before it ended.
 const GAP_MAX_MM: f64 = 1e-6;
-/// Step times may be off by this much at most, whoever asks for more.
-const ERROR_MAX: Seconds = Seconds(1e-3);
 
-/// One motor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepperSpec {
-    /// How far the axis goes in one step.
-    pub step_distance: Mm,
-    /// How early or late a step may come; never more than a quarter of the gap to either neighbour.
-    pub max_error: Seconds,
+/// What shapes the paths of the axes, before the kinematics.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Filters {
+    /// Input shapers of x, y and z.
+    pub shapers: [Option<Shaper>; 3],
+    /// The window over which the filament's path is smoothed, s, at most [`SMOOTH_TIME_MAX`]; none where there is no
+    /// pressure advance.
+    pub smooth_time: Option<Seconds>,
 }
 
-impl StepperSpec {
-    /// The usual allowance for the time of a step.
-    pub const MAX_ERROR: Seconds = Seconds(25e-6);
+/// The widest window of smoothing.
+pub const SMOOTH_TIME_MAX: Seconds = Seconds(0.2);
 
-    /// A motor with the usual allowance.
-    pub const fn new(step_distance: Mm) -> Self {
-        Self { step_distance, max_error: Self::MAX_ERROR }
+impl Filters {
+    /// The filter on one axis.
+    fn on(&self, axis: usize) -> Option<Filter> {
+        match self.shapers.get(axis) {
+            Some(shaper) => shaper.as_ref().map(Filter::shaper),
+            None => self.smooth_time.map(|time| Filter::smoothing(time.0.clamp(1e-4, SMOOTH_TIME_MAX.0))),
+        }
     }
 }
 
-/// Why steps cannot be generated for a machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum SpecError {
-    /// The list of steppers is not as long as the kinematics has motors.
-    #[error("the kinematics needs {needed} motors, {given} are given")]
-    Motors {
-        /// What the kinematics has.
-        needed: usize,
-        /// What was given.
-        given: usize,
-    },
-    /// A step distance outside 1 nm ..= 1 m.
-    #[error("the step distance of motor {motor} is not usable")]
-    StepDistance {
-        /// Place in the list.
-        motor: usize,
-    },
-    /// An allowance outside 0 ..= 1 ms.
-    #[error("the step time error of motor {motor} is not usable")]
-    MaxError {
-        /// Place in the list.
-        motor: usize,
-    },
-    /// A clock below 100 kHz.
-    #[error("the clock is too slow to time steps")]
-    Clock,
-}
-
-/// Why a move was not taken. Nothing has changed then.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum PushError {
-    /// The motor would have to make more than 2 million steps a second, or more than a step in 4 ticks.
-    #[error("motor {motor} would have to step faster than any driver can")]
-    StepRate {
-        /// Place in the list.
-        motor: usize,
-    },
-    /// A position or time is not a number or too large.
-    #[error("motor {motor} would leave the range of positions or times")]
-    Range {
-        /// Place in the list.
-        motor: usize,
-    },
-    /// The move does not start where the run or the move before it left the motor.
-    #[error("the move does not start where motor {motor} is")]
-    Gap {
-        /// Place in the list.
-        motor: usize,
-    },
-    /// Steps must be taken with [`StepGenerator::pop`] first.
-    #[error("steps must be taken before more moves are pushed")]
-    Full,
-    /// [`StepGenerator::end_run`] was called: a new run must begin first.
-    #[error("the run has ended")]
-    Ended,
-}
-
-/// What one motor has been given since the generator was made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MotorStats {
-    /// Steps, both ways.
-    pub steps: u64,
-    /// Commands of the kind `QueueStep`.
-    pub queue_steps: u64,
-    /// Commands of the kind `SetDir`.
-    pub direction_changes: u64,
-    /// The fastest two steps of one direction followed each other, in steps a second; 0 where none did.
-    pub peak_steps_per_s: f64,
-    /// The worst distance of a step from the time at which it was due.
-    pub max_error: Seconds,
+/// The way of one axis from the moves to the kinematics.
+#[derive(Clone, Debug, Default)]
+struct Axis {
+    filter: Option<Filter>,
+    /// It is known up to this print time, s.
+    known: f64,
 }
 
 #[derive(Clone, Debug)]
 struct Motor {
     grid: Grid,
+    /// The one axis that it follows …
+    axis: Option<usize>,
+    /// … or what brings several together.
+    merge: Merge,
     /// Position of the last move's end, mm.
     position: f64,
     /// Grid position at the end of the pieces.
     count: i64,
     pieces: VecDeque<Piece>,
     compressor: Compressor,
+    /// Its pieces are complete up to this run clock, ticks.
+    known: f64,
     /// No step that is still to be generated comes before this run clock, ticks.
     generated: f64,
 }
@@ -129,12 +79,18 @@ struct Motor {
 pub struct StepGenerator<K = Cartesian> {
     kinematics: K,
     clock: Hertz,
+    axes: [Axis; AXES],
     motors: Vec<Motor>,
-    /// Run clock at which the last move pushed ends, ticks.
-    pushed: f64,
+    /// On the moves that are pushed from now on.
+    advance: Lines,
+    /// Where and when (s) the last move pushed ends.
+    position: [f64; AXES],
+    end_time: f64,
     ended: bool,
-    segments: Vec<MotorSegment>,
-    /// What the move in hand adds, before it is accepted.
+    /// What the move in hand adds to the axes and to a motor.
+    paths: [Vec<Segment>; AXES],
+    segments: Vec<Segment>,
+    /// What it adds to the motors, before it is accepted.
     staged: Vec<(usize, Piece)>,
     staged_counts: Vec<i64>,
 }
@@ -157,49 +113,100 @@ impl<K: Kinematics> StepGenerator<K> {
             if !(0.0..=ERROR_MAX.0).contains(&spec.max_error.0) {
                 return Err(SpecError::MaxError { motor });
             }
+            let axes = kinematics.axes(motor);
+            let alone = axes.iter().filter(|&&follows| follows).count() == 1;
             motors.push(Motor {
                 grid: Grid { steps_per_mm: 1.0 / spec.step_distance.0, ticks_per_s },
+                axis: axes.iter().position(|&follows| follows).filter(|_| alone),
+                merge: Merge::new(axes),
                 position: 0.0,
                 count: 0,
                 pieces: VecDeque::new(),
                 compressor: Compressor::new(motor, ticks_per_s, spec.max_error),
+                known: 0.0,
                 generated: 0.0,
             });
         }
         Ok(Self {
             kinematics,
             clock,
+            axes: Default::default(),
             motors,
-            pushed: 0.0,
+            advance: Lines::new(&Advance::NONE),
+            position: [0.0; AXES],
+            end_time: 0.0,
             ended: false,
+            paths: Default::default(),
             segments: Vec::new(),
             staged: Vec::new(),
             staged_counts: Vec::new(),
         })
     }
 
+    /// The filters of the runs that begin from now on. What was not taken from the run before is forgotten.
+    pub fn set_filters(&mut self, filters: &Filters) {
+        for (index, axis) in self.axes.iter_mut().enumerate() {
+            axis.filter = filters.on(index);
+        }
+        self.ended = true;
+    }
+
+    /// The pressure advance of the moves that are pushed from now on. It needs a smooth time in [`Filters`].
+    pub fn set_advance(&mut self, advance: &Advance) {
+        self.advance = Lines::new(advance);
+    }
+
+    /// How long after the start of a run its first move may begin: filters move an axis before its move.
+    pub fn lead(&self) -> Seconds {
+        Seconds(self.filters().map(Filter::lead).fold(0.0, f64::max))
+    }
+
+    /// How long after the end of a run's last move the motors may move on.
+    pub fn tail(&self) -> Seconds {
+        Seconds(self.filters().map(Filter::tail).fold(0.0, f64::max))
+    }
+
+    fn filters(&self) -> impl Iterator<Item = &Filter> {
+        self.axes.iter().filter_map(|axis| axis.filter.as_ref())
+    }
+
+    /// Segments that the filters hold: the most of any, see [`crate::SEGMENTS_HELD_MAX`].
+    pub fn segments_held(&self) -> usize {
+        self.filters().map(Filter::held).max().unwrap_or(0)
+    }
+
     /// A run of motion starts at rest at `position` (x, y, z, e in mm), at tick 0. Whatever was not taken from the run
     /// before is forgotten.
-    pub fn begin_run(&mut self, position: [f64; 4]) -> Result<(), PushError> {
+    pub fn begin_run(&mut self, position: [f64; AXES]) -> Result<(), PushError> {
         for motor in 0..self.motors.len() {
             let at = self.kinematics.motor_position(motor, &position);
             if !is_in_range(at * self.motors[motor].grid.steps_per_mm) {
                 return Err(PushError::Range { motor });
             }
         }
+        for (axis, &at) in self.axes.iter_mut().zip(&position) {
+            axis.known = 0.0;
+            if let Some(filter) = &mut axis.filter {
+                filter.begin(at);
+            }
+        }
         for (index, motor) in self.motors.iter_mut().enumerate() {
             motor.position = self.kinematics.motor_position(index, &position);
             motor.count = nearest_step(motor.position * motor.grid.steps_per_mm);
+            motor.merge.begin(position);
             motor.pieces.clear();
             motor.compressor.begin_run();
+            motor.known = 0.0;
             motor.generated = 0.0;
         }
-        self.pushed = 0.0;
+        self.position = position;
+        self.end_time = 0.0;
         self.ended = false;
         Ok(())
     }
 
-    /// Takes the next move of the run.
+    /// Takes the next move of the run. Where that fails, nothing has changed, but for [`PushError::StepRate`] with filters or
+    /// motors that follow several axes: the run cannot go on then.
     pub fn push(&mut self, planned: &PlannedMove) -> Result<(), PushError> {
         if self.ended {
             return Err(PushError::Ended);
@@ -213,19 +220,23 @@ impl<K: Kinematics> StepGenerator<K> {
         if !(times.iter().all(|&time| time >= 0.0) && end_time <= 2.0 * RUN_TIME_MAX.0) {
             return Err(PushError::Range { motor: 0 });
         }
-        self.staged.clear();
-        self.staged_counts.clear();
-        for motor in 0..self.motors.len() {
-            self.stage(motor, planned)?;
+        if planned.start_time < self.lead().0 {
+            return Err(PushError::TooEarly);
         }
-        for (motor, piece) in self.staged.drain(..) {
-            self.motors[motor].pieces.push_back(piece);
+        self.check_ends(planned)?;
+        self.push_to_axes(planned);
+        if let Err(error) = self.stage() {
+            let filtered = self.filters().next().is_some();
+            let merged = self.motors.iter().any(|motor| motor.axis.is_none());
+            self.ended |= filtered || merged;
+            return Err(error);
         }
+        self.accept();
+        self.position = planned.to;
+        self.end_time = self.end_time.max(end_time);
         for (index, motor) in self.motors.iter_mut().enumerate() {
-            motor.count = self.staged_counts[index];
             motor.position = self.kinematics.motor_position(index, &planned.to);
         }
-        self.pushed = self.pushed.max(end_time * f64::from(self.clock.0));
         Ok(())
     }
 
@@ -233,45 +244,118 @@ impl<K: Kinematics> StepGenerator<K> {
         self.motors.iter().any(|motor| motor.pieces.len() >= PIECES_MAX)
     }
 
-    /// Works out one motor's share of a move.
-    fn stage(&mut self, index: usize, planned: &PlannedMove) -> Result<(), PushError> {
-        let motor = &self.motors[index];
-        let start = self.kinematics.motor_position(index, &planned.from);
-        let end = self.kinematics.motor_position(index, &planned.to);
-        if !(is_in_range(start * motor.grid.steps_per_mm) && is_in_range(end * motor.grid.steps_per_mm)) {
-            return Err(PushError::Range { motor: index });
-        }
-        if (start - motor.position).abs() > GAP_MAX_MM {
-            return Err(PushError::Gap { motor: index });
-        }
-        self.segments.clear();
-        self.kinematics.motor_segments(planned, index, &mut self.segments);
-        let mut count = motor.count;
-        let rate_max = 1.0 / gap_min_ticks(motor.grid.ticks_per_s);
-        for segment in &self.segments {
-            // A stretch without a step may claim any speed.
-            let is_possible = motor.grid.peak_rate(segment) <= rate_max;
-            let mut is_fast = false;
-            motor.grid.split(segment, &mut count, &mut |piece| {
-                is_fast |= !is_possible || piece.is_faster_than(rate_max);
-                self.staged.push((index, piece));
-            });
-            if is_fast {
-                return Err(PushError::StepRate { motor: index });
+    /// Whether every motor starts where it is and ends in its range.
+    fn check_ends(&self, planned: &PlannedMove) -> Result<(), PushError> {
+        for (index, motor) in self.motors.iter().enumerate() {
+            let start = self.kinematics.motor_position(index, &planned.from);
+            let end = self.kinematics.motor_position(index, &planned.to);
+            let scale = motor.grid.steps_per_mm;
+            if !(is_in_range(start * scale) && is_in_range(end * scale)) {
+                return Err(PushError::Range { motor: index });
+            }
+            if (start - motor.position).abs() > GAP_MAX_MM {
+                return Err(PushError::Gap { motor: index });
             }
         }
-        self.staged_counts.push(count);
         Ok(())
     }
 
-    /// The run ends at rest with what has been pushed: [`Self::pop`] now gives everything out.
-    pub const fn end_run(&mut self) {
-        self.ended = true;
+    /// What becomes known of each axis with a move.
+    fn push_to_axes(&mut self, planned: &PlannedMove) {
+        let draws = planned.direction[0] != 0.0 || planned.direction[1] != 0.0;
+        for (index, (axis, path)) in self.axes.iter_mut().zip(&mut self.paths).enumerate() {
+            path.clear();
+            let (from, to) = (planned.from[index], planned.to[index]);
+            let Some(filter) = &mut axis.filter else {
+                axis.known = planned.end_time();
+                if from != to {
+                    segments(planned, from, to, planned.direction[index], &mut |segment| path.push(segment));
+                }
+                continue;
+            };
+            let input = filter.path();
+            input.rest_until(planned.start_time);
+            if from == to {
+                input.rest_at(planned.end_time(), to);
+            } else {
+                let has_advance = index == EXTRUDER && draws && to > from;
+                segments(planned, from, to, planned.direction[index], &mut |segment| {
+                    if has_advance {
+                        self.advance.apply(&segment, &mut |segment| input.push(segment));
+                    } else {
+                        input.push(segment);
+                    }
+                });
+            }
+            filter.drain(path);
+            axis.known = filter.known_until();
+        }
     }
 
-    /// With `end`, the same as [`Self::end_run`]. Without, nothing: steps are given out as soon as they are final.
-    pub const fn flush(&mut self, end: bool) {
-        self.ended |= end;
+    /// Works out the motors' shares of what has become known of the axes.
+    fn stage(&mut self) -> Result<(), PushError> {
+        self.staged.clear();
+        self.staged_counts.clear();
+        let known = self.axes.each_ref().map(|axis| axis.known);
+        for index in 0..self.motors.len() {
+            let motor = &mut self.motors[index];
+            let mut count = motor.count;
+            let segments = if let Some(axis) = motor.axis {
+                &self.paths[axis]
+            } else {
+                self.segments.clear();
+                motor.merge.take(&self.paths, &known, |stretch| {
+                    self.kinematics.motor_segments(index, stretch, &mut self.segments);
+                });
+                &self.segments
+            };
+            let rate_max = 1.0 / gap_min_ticks(motor.grid.ticks_per_s);
+            for segment in segments {
+                let mut is_fast = false;
+                // A stretch without a step may claim any speed.
+                let is_possible = motor.grid.peak_rate(segment) <= rate_max;
+                motor.grid.split(segment, &mut count, &mut |piece| {
+                    is_fast |= !is_possible || piece.is_faster_than(rate_max);
+                    self.staged.push((index, piece));
+                });
+                if is_fast {
+                    return Err(PushError::StepRate { motor: index });
+                }
+            }
+            self.staged_counts.push(count);
+        }
+        Ok(())
+    }
+
+    /// Gives the motors what was staged.
+    fn accept(&mut self) {
+        for (motor, piece) in self.staged.drain(..) {
+            self.motors[motor].pieces.push_back(piece);
+        }
+        for (index, motor) in self.motors.iter_mut().enumerate() {
+            motor.count = self.staged_counts[index];
+            let known = motor.axis.map_or(motor.merge.time(), |axis| self.axes[axis].known);
+            motor.known = larger(motor.known, known * motor.grid.ticks_per_s);
+        }
+    }
+
+    /// The run ends at rest with what has been pushed: [`Self::pop`] now gives everything out.
+    pub fn end_run(&mut self) -> Result<(), PushError> {
+        if self.ended {
+            return Ok(());
+        }
+        self.ended = true;
+        let end_time = self.end_time + self.tail().0;
+        for (index, (axis, path)) in self.axes.iter_mut().zip(&mut self.paths).enumerate() {
+            path.clear();
+            if let Some(filter) = &mut axis.filter {
+                filter.finish(self.end_time, self.position[index], path);
+            }
+            axis.known = end_time;
+        }
+        self.stage()?;
+        self.accept();
+        Ok(())
     }
 
     /// The next command, in the order of the (true) time of its first step over all motors; `None` until more is pushed
@@ -284,12 +368,12 @@ impl<K: Kinematics> StepGenerator<K> {
             if first.compressor.is_ready() {
                 return first.compressor.pop();
             }
-            if !first.advance(self.pushed, self.ended) {
+            if !first.advance(self.ended) {
                 if !is_full {
                     return None;
                 }
                 // Its open command holds up a motor whose pieces have no room left.
-                first.compressor.close_early(self.pushed);
+                first.compressor.close_early(first.known);
                 if !first.compressor.is_ready() {
                     return None;
                 }
@@ -304,7 +388,8 @@ impl<K: Kinematics> StepGenerator<K> {
 
     /// Grid position of a motor at the end of the last move pushed, in steps; 0 for a motor that is not there.
     pub fn motor_steps(&self, motor: usize) -> StepCount {
-        StepCount(self.motors.get(motor).map_or(0, |motor| motor.count))
+        let steps = |motor: &Motor| nearest_step(motor.position * motor.grid.steps_per_mm);
+        StepCount(self.motors.get(motor).map_or(0, steps))
     }
 
     /// What each motor has been given, in the order of the steppers.
@@ -331,26 +416,26 @@ impl Motor {
     }
 
     /// Generates some steps; `false` where nothing can be done before more is pushed.
-    fn advance(&mut self, pushed: f64, ended: bool) -> bool {
+    fn advance(&mut self, ended: bool) -> bool {
         let Some(piece) = self.pieces.front_mut() else {
             let before = self.generated;
             if ended {
                 self.generated = f64::INFINITY;
                 self.compressor.end();
             } else {
-                self.generated = larger(before, pushed);
-                self.compressor.idle_until(pushed);
+                self.generated = larger(before, self.known);
+                self.compressor.idle_until(self.known);
             }
             return self.generated > before || self.compressor.is_ready();
         };
-        for _ in 0..TURN_STEPS {
-            if piece.steps == 0 {
-                break;
-            }
-            let time = piece.next_time();
-            self.compressor.step(time, piece.forward);
-            self.generated = time;
-        }
+        let forward = piece.forward;
+        let mut last = self.generated;
+        let compressor = &mut self.compressor;
+        piece.take(TURN_STEPS, |time| {
+            compressor.step(time, forward);
+            last = time;
+        });
+        self.generated = last;
         if piece.steps == 0 {
             self.pieces.pop_front();
         }

@@ -1,37 +1,28 @@
-//! From the path of the machine to the path of each motor.
+//! From the paths of the axes to the path of each motor.
 
-use motion::PlannedMove;
+use crate::Segment;
 
-/// A stretch of one motor's path: position is a quadratic in time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MotorSegment {
-    /// Print time at which it starts, s.
-    pub start_time: f64,
-    /// How long it lasts, s.
-    pub duration: f64,
-    /// Motor position at its start, mm.
-    pub start: f64,
-    /// Motor position at its end, mm: exact at the end of a move, so that no rounding is carried on.
-    pub end: f64,
-    /// Motor speed at its start, mm/s.
-    pub velocity: f64,
-    /// Half the motor's acceleration, mm/s².
-    pub half_accel: f64,
-}
+/// The axes of a machine: x, y, z and the filament, in this order.
+pub const AXES: usize = 4;
 
 /// How the motors of a machine follow its head: the seam for other machines.
 ///
-/// Kinematics whose motors do not move quadratically in time split a move into as many segments as their accuracy
-/// needs; segments follow each other without a gap in time or position.
+/// The paths that come in are those of the axes, after shaping and pressure advance. Kinematics whose motors do not move
+/// as a polynomial of time where the axes do split a stretch into as many segments as their accuracy needs; segments
+/// follow each other without a gap in time or position.
 pub trait Kinematics {
     /// The number of motors.
     fn motors(&self) -> usize;
 
-    /// Where a motor is when the machine is at `position` (x, y, z, e in mm).
-    fn motor_position(&self, motor: usize, position: &[f64; 4]) -> f64;
+    /// The axes that a motor follows. One that follows a single axis is given that axis' segments as they are.
+    fn axes(&self, motor: usize) -> [bool; AXES];
 
-    /// Appends the path of `motor` over one move; nothing where it stands still.
-    fn motor_segments(&self, planned: &PlannedMove, motor: usize, out: &mut Vec<MotorSegment>);
+    /// Where a motor is when the machine is at `position` (x, y, z, e in mm).
+    fn motor_position(&self, motor: usize, position: &[f64; AXES]) -> f64;
+
+    /// Appends the path of `motor` over a stretch of time in which each axis is one segment, all of them from the same
+    /// start and equally long; nothing where it stands still. Axes that the motor does not follow are not meaningful.
+    fn motor_segments(&self, motor: usize, stretch: &[Segment; AXES], out: &mut Vec<Segment>);
 }
 
 /// One motor for each of x, y, z and e, in this order.
@@ -40,36 +31,18 @@ pub struct Cartesian;
 
 impl Kinematics for Cartesian {
     fn motors(&self) -> usize {
-        4
+        AXES
     }
 
-    fn motor_position(&self, motor: usize, position: &[f64; 4]) -> f64 {
+    fn axes(&self, motor: usize) -> [bool; AXES] {
+        core::array::from_fn(|axis| axis == motor)
+    }
+
+    fn motor_position(&self, motor: usize, position: &[f64; AXES]) -> f64 {
         position[motor]
     }
 
-    fn motor_segments(&self, planned: &PlannedMove, motor: usize, out: &mut Vec<MotorSegment>) {
-        linear_segments(planned, planned.from[motor], planned.to[motor], planned.direction[motor], out);
-    }
-}
-
-/// The phases of a motor whose position is linear in the distance along the path: `ratio` mm of the motor a mm.
-fn linear_segments(planned: &PlannedMove, from: f64, to: f64, ratio: f64, out: &mut Vec<MotorSegment>) {
-    if from == to {
-        return;
-    }
-    let mut start_time = planned.start_time;
-    let mut start = from;
-    for phase in planned.phases() {
-        let end = if phase.end_distance == planned.length { to } else { from + ratio * phase.end_distance };
-        out.push(MotorSegment {
-            start_time,
-            duration: phase.duration,
-            start,
-            end,
-            velocity: phase.velocity * ratio,
-            half_accel: 0.5 * phase.accel * ratio,
-        });
-        start_time += phase.duration;
-        start = end;
+    fn motor_segments(&self, motor: usize, stretch: &[Segment; AXES], out: &mut Vec<Segment>) {
+        out.push(stretch[motor]);
     }
 }

@@ -14,15 +14,28 @@
 //! them) → `stabbing` (the longest quadratic through the windows; after J. O'Rourke, "An on-line algorithm for fitting
 //! straight lines between data ranges", 1981).
 
+mod advance;
 mod compressor;
 mod crossing;
+mod delayed_sum;
+mod filter;
 mod generator;
 mod kinematics;
+mod merge;
+mod polynomial;
+mod segment;
+mod shaper;
+mod spec;
 mod stabbing;
 
+pub use advance::{Advance, Nonlinear};
 pub use compressor::{RUN_SPAN_MAX, STEP_HOLD_MAX, STEPS_BUFFERED_MAX};
-pub use generator::{MotorStats, PIECES_MAX, PushError, SpecError, StepGenerator, StepperSpec};
-pub use kinematics::{Cartesian, Kinematics, MotorSegment};
+pub use delayed_sum::SEGMENTS_HELD_MAX;
+pub use generator::{Filters, PIECES_MAX, SMOOTH_TIME_MAX, StepGenerator};
+pub use kinematics::{AXES, Cartesian, Kinematics};
+pub use segment::{DEGREE_MAX, Segment};
+pub use shaper::{DAMPING_RATIOS, SHAPER_FREQUENCIES, Shaper, ShaperKind};
+pub use spec::{MotorStats, PushError, SpecError, StepperSpec};
 
 use units::{Hertz, Ticks};
 
@@ -71,5 +84,7 @@ pub fn step_rate_max(clock: Hertz) -> f64 {
     ticks_per_s / compressor::gap_min_ticks(ticks_per_s)
 }
 
+#[cfg(test)]
+mod filter_tests;
 #[cfg(test)]
 mod tests;

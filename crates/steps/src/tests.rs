@@ -8,10 +8,10 @@ use motion::{ExtruderLimits, Limits, LookAhead, MoveRequest, PlannedMove};
 use proptest::prelude::*;
 use units::{Hertz, Mm, MmPerS, MmPerS2, Seconds, StepCount, Ticks};
 
-const CLOCK: Hertz = Hertz(12_000_000);
-const STEP_DISTANCES: [f64; 4] = [0.0125, 0.0125, 0.0025, 0.007_087_172_218_75];
+pub(crate) const CLOCK: Hertz = Hertz(12_000_000);
+pub(crate) const STEP_DISTANCES: [f64; 4] = [0.0125, 0.0125, 0.0025, 0.007_087_172_218_75];
 
-fn limits() -> Limits {
+pub(crate) fn limits() -> Limits {
     Limits {
         max_velocity: MmPerS(300.0),
         max_accel: MmPerS2(3000.0),
@@ -56,13 +56,13 @@ fn commands(generator: &mut StepGenerator, planned: &[PlannedMove], eager: bool)
             assert!(held <= held_max * f64::from(CLOCK.0), "steps are held back for {held} ticks");
         }
     }
-    generator.end_run();
+    generator.end_run().unwrap();
     out.extend(std::iter::from_fn(|| generator.pop()));
     out
 }
 
 /// The clock and direction of each step of `motor`, as a board would make them.
-fn decompress(commands: &[StepCommand], motor: usize) -> Vec<(u64, bool)> {
+pub(crate) fn decompress(commands: &[StepCommand], motor: usize) -> Vec<(u64, bool)> {
     let mut steps = Vec::new();
     let mut forward = None;
     let mut clock = 0_u64;
@@ -156,7 +156,7 @@ fn check(planned: &[PlannedMove], commands: &[StepCommand], clock: Hertz) {
 }
 
 /// Points of every kind: travel, lines in small pieces, z, the filament alone, there and back.
-fn any_points() -> impl Strategy<Value = Vec<([f64; 4], f64)>> {
+pub(crate) fn any_points() -> impl Strategy<Value = Vec<([f64; 4], f64)>> {
     let grid = || (-160..160_i32).prop_map(|k| f64::from(k) * 0.00625);
     let delta = prop_oneof![
         2 => (-20.0..20.0_f64, -20.0..20.0_f64, Just(0.0), 0.0..0.5_f64),
@@ -175,7 +175,7 @@ fn any_points() -> impl Strategy<Value = Vec<([f64; 4], f64)>> {
     })
 }
 
-const START: [f64; 4] = [100.0, 50.003, 0.2, 1234.5];
+pub(crate) const START: [f64; 4] = [100.0, 50.003, 0.2, 1234.5];
 
 proptest! {
     #[test]
@@ -351,7 +351,7 @@ fn impossible_machines_and_moves_are_refused() {
     let elsewhere = plan([5.0; 4], &[([6.0; 4], 1.0)]);
     assert_eq!(generator.push(&elsewhere[0]), Err(PushError::Gap { motor: 0 }));
     assert_eq!(generator.begin_run([0.0, f64::NAN, 0.0, 0.0]), Err(PushError::Range { motor: 1 }));
-    generator.end_run();
+    generator.end_run().unwrap();
     assert_eq!(generator.pop(), None);
     assert_eq!(generator.push(&fast[0]), Err(PushError::Ended));
 }
@@ -398,7 +398,7 @@ fn a_motor_that_waits_for_its_neighbour_never_blocks_a_busy_one() {
         }
         (at, time) = (to, planned.end_time());
     }
-    generator.end_run();
+    generator.end_run().unwrap();
     out.extend(std::iter::from_fn(|| generator.pop()));
     assert_eq!(decompress(&out, 0).len(), steps as usize);
     assert_eq!(decompress(&out, 1).len(), 1);
@@ -429,7 +429,7 @@ fn a_fast_straight_line_of_tiny_pieces_flows_however_it_is_taken() {
                 out.extend(std::iter::from_fn(|| generator.pop()));
             }
         }
-        generator.end_run();
+        generator.end_run().unwrap();
         out.extend(std::iter::from_fn(|| generator.pop()));
         out
     };

@@ -5,7 +5,10 @@ use core::ops::Range;
 use units::{Celsius, MmPerS, MmPerS2, Seconds};
 
 use super::{Interpreter, Out, Said};
-use crate::action::{Action, Heater, ObjectAction, ObjectId, PauseReason, VelocityLimit, Wait};
+use crate::action::{
+    Action, AxisShaper, Heater, InputShaper, ObjectAction, ObjectId, PauseReason, ShaperName, VelocityLimit,
+    Wait,
+};
 use crate::annotation::text_of;
 use crate::diagnostic::DiagnosticCode;
 use crate::diagnostic::Severity::{Blocking, Error, Info};
@@ -141,6 +144,7 @@ impl Interpreter {
                 advance: call.number("ADVANCE", 0.0..=1e3, out)?,
                 smooth_time: call.number("SMOOTH_TIME", 0.0..=0.2, out)?.map(Seconds),
             },
+            "SET_INPUT_SHAPER" => Action::InputShaper(call.input_shaper(out)?),
             "EXCLUDE_OBJECT_DEFINE" => return Ok(call.define_object(out)?.map(Action::Object)),
             "EXCLUDE_OBJECT_START" => Action::Object(ObjectAction::Start(call.required_object(out)?)),
             "EXCLUDE_OBJECT_END" => Action::Object(ObjectAction::End(call.object())),
@@ -209,7 +213,7 @@ impl Interpreter {
 }
 
 fn is_known(name: &str) -> bool {
-    const KNOWN: [&str; 14] = [
+    const KNOWN: [&str; 15] = [
         "ACTIVATE_EXTRUDER",
         "CANCEL_PRINT",
         "EXCLUDE_OBJECT",
@@ -220,6 +224,7 @@ fn is_known(name: &str) -> bool {
         "PAUSE",
         "RESPOND",
         "SET_HEATER_TEMPERATURE",
+        "SET_INPUT_SHAPER",
         "SET_PRESSURE_ADVANCE",
         "SET_VELOCITY_LIMIT",
         "TEMPERATURE_WAIT",
@@ -305,6 +310,37 @@ impl Call<'_> {
             out.say(Error, DiagnosticCode::MissingValue, self.columns.clone(), message);
             Said
         })
+    }
+
+    /// `SHAPER_TYPE` is for both axes, those of an axis go before it.
+    fn input_shaper(&self, out: &mut Out<'_>) -> Result<InputShaper, Said> {
+        let both = self.shaper_name("SHAPER_TYPE", out)?;
+        let x = self.axis_shaper(["SHAPER_TYPE_X", "SHAPER_FREQ_X", "DAMPING_RATIO_X"], out)?;
+        let y = self.axis_shaper(["SHAPER_TYPE_Y", "SHAPER_FREQ_Y", "DAMPING_RATIO_Y"], out)?;
+        let [x, y] = [x, y].map(|axis| AxisShaper { kind: axis.kind.or(both), ..axis });
+        Ok(InputShaper { x, y })
+    }
+
+    fn axis_shaper(&self, keys: [&str; 3], out: &mut Out<'_>) -> Result<AxisShaper, Said> {
+        let kind = self.shaper_name(keys[0], out)?;
+        // 0 is off; otherwise the lowest that a shaper can be made for.
+        let frequency = match self.get(keys[1]).and_then(Parameter::number) {
+            Some(0.0) => Some(0.0),
+            _ => self.number(keys[1], 5.0..=1e3, out)?,
+        };
+        Ok(AxisShaper { kind, frequency, damping_ratio: self.number(keys[2], 0.0..=0.9, out)? })
+    }
+
+    fn shaper_name(&self, key: &str, out: &mut Out<'_>) -> Result<Option<ShaperName>, Said> {
+        let Some(parameter) = self.get(key) else { return Ok(None) };
+        let name = ShaperName::new(parameter.value);
+        if name.is_none() {
+            let text = text_of(parameter.value);
+            let message = format!("`{text}` is no input shaper that is known here. The line is skipped.");
+            out.say(Error, DiagnosticCode::ValueOutOfRange, parameter.start..parameter.end, message);
+            return Err(Said);
+        }
+        Ok(name)
     }
 
     fn object(&self) -> Option<ObjectId> {

@@ -46,6 +46,15 @@ pub(super) fn hint(key: &str) -> &'static str {
             "a filament speed in mm/s, e.g. 40"
         }
         "max_extrude_only_accel" => "an acceleration of filament in mm/s², e.g. 1500",
+        "pressure_advance_model" => "`linear`, `tanh` or `recipr`",
+        "linear_advance" => "an advance in seconds, e.g. 0.02",
+        "nonlinear_offset" => "a length of filament in mm, e.g. 0.1",
+        "linearization_velocity" => "a speed of the filament in mm/s, e.g. 2",
+        "shaper_type" | "shaper_type_x" | "shaper_type_y" => {
+            "`zv`, `mzv`, `zvd`, `ei`, `2hump_ei` or `3hump_ei`"
+        }
+        "shaper_freq_x" | "shaper_freq_y" => "the resonance's frequency in Hz, e.g. 50; 0 is off",
+        "damping_ratio_x" | "damping_ratio_y" => "the resonance's damping ratio, e.g. 0.1",
         "pressure_advance" => "pressure advance in seconds, e.g. 0.045",
         "pressure_advance_smooth_time" => "a time in seconds, e.g. 0.040",
         "heater_pin" => "the heater's output pin, e.g. gpio17",

@@ -9,6 +9,7 @@
 
 mod diagnostics;
 mod document;
+mod dynamics;
 mod hints;
 mod machine;
 mod pin;
@@ -20,6 +21,7 @@ mod torque;
 
 pub use diagnostics::{CONFIG_DIAGNOSTICS_MAX, ConfigDiagnostic, Severity};
 pub use document::CONFIG_BYTES_MAX;
+pub use dynamics::AxisShaperConfig;
 pub use machine::{
     FirmwareRetraction, IdleTimeoutConfig, Kinematics, MachineConfig, McuConfig, UnreachableSpeed,
 };
@@ -49,6 +51,8 @@ pub struct PrinterConfig {
     pub fan: Option<FanConfig>,
     /// `[idle_timeout]`.
     pub idle_timeout: IdleTimeoutConfig,
+    /// `[input_shaper]` for X and Y.
+    pub input_shaper: [AxisShaperConfig; 2],
     /// `[firmware_retraction]`: what G10 and G11 do; none where the section is missing.
     pub firmware_retraction: Option<FirmwareRetraction>,
     /// `[motor_torque …]` of X, Y, Z and the extruder: what a motor can do at each speed, where that is known.
@@ -58,6 +62,12 @@ pub struct PrinterConfig {
 }
 
 impl PrinterConfig {
+    /// How far an input shaper may move an axis from when its move does.
+    pub fn shaper_reach(&self) -> units::Seconds {
+        let reaches = self.input_shaper.iter().filter_map(AxisShaperConfig::shaper);
+        units::Seconds(reaches.map(|shaper| shaper.duration().0).fold(0.0, f64::max))
+    }
+
     /// Every heater of the machine.
     pub fn heaters(&self) -> impl Iterator<Item = &HeaterConfig> {
         self.extruder.iter().map(|extruder| &extruder.heater).chain(&self.heater_bed)
@@ -119,6 +129,7 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
     let heater_bed = thermal::heater_bed(&mut builder, &custom);
     let fan = thermal::fan(&mut builder);
     let idle_timeout = machine::idle_timeout(&mut builder);
+    let input_shaper = dynamics::input_shaper(&mut builder);
     let firmware_retraction = machine::firmware_retraction(&mut builder);
     let force_move = machine::force_move(&mut builder);
     let motors = [&x, &y, &z].map(|axis| axis.as_ref().ok().map(|axis| axis.motor.clone()));
@@ -142,6 +153,7 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
         heater_bed: heater_bed?,
         fan: fan?,
         idle_timeout: idle_timeout?,
+        input_shaper: input_shaper?,
         firmware_retraction: firmware_retraction?,
         abilities: {
             let [x, y, z, e] = abilities;

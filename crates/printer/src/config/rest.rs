@@ -53,7 +53,6 @@ const MISSED: &[(&str, &str)] = &[
     ("safe_z_home", "homing is done where the head stands"),
     ("homing_override", "homing follows the endstops instead"),
     ("homing_heaters", "heaters stay on while homing"),
-    ("input_shaper", "vibrations are not damped yet"),
     ("resonance_tester", "resonances cannot be measured yet"),
     ("adxl345", "resonances cannot be measured yet"),
     ("skew_correction", "the axes are taken as square"),

@@ -79,8 +79,8 @@ pub struct ExtruderConfig {
     pub max_extrude_only_velocity: MmPerS,
     /// Acceleration of a push without travel.
     pub max_extrude_only_accel: MmPerS2,
-    /// Pressure advance; 0 is off.
-    pub pressure_advance: Seconds,
+    /// Pressure advance.
+    pub advance: steps::Advance,
     /// Time over which pressure advance is smoothed.
     pub pressure_advance_smooth_time: Seconds,
 }
@@ -350,8 +350,8 @@ pub(super) fn extruder(
     let filament = filament_limits(&mut reader);
     let corner = reader.number_or("instantaneous_corner_velocity", 1.0, Range::from(0.0).to(1_000.0));
     let distance = reader.number_or("max_extrude_only_distance", 50.0, Range::from(0.0).to(100_000.0));
-    let advance = reader.number_or("pressure_advance", 0.0, Range::from(0.0).to(10.0));
-    let smooth = reader.number_or("pressure_advance_smooth_time", 0.040, Range::above(0.0).to(0.2));
+    let advance = super::dynamics::advance(&mut reader);
+    let smooth = reader.number_or("pressure_advance_smooth_time", 0.040, Range::from(0.0).to(0.2));
     reader.finish();
     let (filament, (max_velocity, max_accel)) = (filament?, limits?);
     // Filament may always go as fast as it must for the widest usual extrusion at full speed.
@@ -366,7 +366,7 @@ pub(super) fn extruder(
         max_extrude_only_distance: Mm(distance?),
         max_extrude_only_velocity: MmPerS(filament.velocity.unwrap_or(max_velocity.0 * usual_ratio)),
         max_extrude_only_accel: MmPerS2(filament.accel.unwrap_or(max_accel.0 * usual_ratio)),
-        pressure_advance: Seconds(advance?),
+        advance: advance?,
         pressure_advance_smooth_time: Seconds(smooth?),
     }))
 }

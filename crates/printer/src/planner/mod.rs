@@ -5,6 +5,7 @@
 //! knows no host time and no board clock: times are seconds, and step commands are ticks, from the start of a **run of
 //! motion**, which is a stretch that begins and ends at rest.
 
+mod dynamics;
 mod guard;
 mod item;
 mod report;
@@ -20,6 +21,7 @@ use motion::{Bound, Limits, LookAhead, MoveRequest, PlannedMove};
 use steps::{PushError, StepGenerator};
 use units::{Hertz, MmPerS, Seconds, Ticks};
 
+use dynamics::Course;
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
 pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanStream, Ramps};
@@ -65,7 +67,6 @@ const DWELL_IN_RUN_MAX: Seconds = Seconds(2.0);
 /// What is said of a source once, however often it asks for it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Said {
-    pressure_advance: bool,
     other_fans: bool,
     slowed: bool,
     clamped: bool,
@@ -93,6 +94,7 @@ pub struct Planner {
     ready: VecDeque<Planned>,
     barrier: Option<(LineNumber, Barrier)>,
     said: Said,
+    course: Course,
     step_rates: StepRates,
     unreachable_speed: UnreachableSpeed,
     is_broken: bool,
@@ -123,6 +125,7 @@ impl Planner {
             ready: VecDeque::new(),
             barrier: None,
             said: Said::default(),
+            course: Course::new(config),
             step_rates: StepRates::new(config, clock),
             unreachable_speed: config.printer.unreachable_speed,
             is_broken: false,
@@ -200,6 +203,8 @@ impl Planner {
         debug_assert!(self.is_at_rest(), "a job begins at rest");
         self.position[EXTRUDER] = 0.0;
         self.limits = self.machine_limits;
+        self.course.begin_job();
+        self.step_rates.set_advance(self.course.read().effective_advance().slope_max());
         // They have been checked when the planner was made.
         let _ = self.look_ahead.set_limits(self.limits);
         self.adopt(source);
@@ -275,13 +280,14 @@ impl Planner {
             }
             match self.run {
                 Run::Ending => {
-                    self.generator.end_run();
+                    self.generator.end_run().map_err(|error| self.unsteppable(error, None))?;
                     self.run = Run::Draining;
                     continue;
                 }
                 Run::Draining => {
                     self.run = Run::None;
-                    self.planned_until = self.look_ahead.print_time();
+                    let still = self.planned_until + self.generator.tail();
+                    self.planned_until = self.look_ahead.print_time().max(still);
                     return Ok(Planned::RunEnded(self.planned_until));
                 }
                 Run::Active | Run::None => {}
@@ -349,13 +355,7 @@ impl Planner {
             }
             Action::TurnOffHeaters => self.defer(line, TimedAction::TurnOffHeaters),
             Action::Cancel => self.barrier = Some((line, Barrier::Cancel)),
-            Action::PressureAdvance { .. } => {
-                if !core::mem::replace(&mut self.said.pressure_advance, true) {
-                    let text =
-                        "pressure advance is not applied by this version: the print is made without it";
-                    self.notice(line, text);
-                }
-            }
+            Action::PressureAdvance { .. } | Action::InputShaper(_) => self.set_dynamics(&action),
             // The interpreter has the factors in its moves already; the machine file knows the machine's limits; there
             // is only one tool.
             Action::SpeedFactor(_)
@@ -364,6 +364,22 @@ impl Planner {
             | Action::SelectTool(_) => {}
         }
         Ok(())
+    }
+
+    /// Takes an advance or a shaper; one that changes the filters lets the machine come to rest first.
+    fn set_dynamics(&mut self, action: &Action) {
+        let read = self.course.read();
+        let dynamics = match action {
+            Action::PressureAdvance { advance, smooth_time } => read.with_advance(*advance, *smooth_time),
+            Action::InputShaper(change) => read.with_shaper(change),
+            _ => return,
+        };
+        self.step_rates.set_advance(dynamics.effective_advance().slope_max());
+        if self.course.set(dynamics, self.moves_pushed) {
+            self.finish_run();
+        } else if self.moves_planned == self.moves_pushed {
+            self.course.planned(self.moves_planned, &mut self.generator);
+        }
     }
 
     fn notice_fan(&mut self, line: LineNumber) {
@@ -460,7 +476,10 @@ impl Planner {
         self.step_rates.judge_request(self.position, to, feed, &self.limits, line)?;
         if self.run == Run::None {
             self.look_ahead.begin_run();
+            self.course.begin_run(&mut self.generator);
             self.generator.begin_run(self.position).map_err(|error| wrong(&error).at_line(line.0))?;
+            // Filters move an axis before its move.
+            self.look_ahead.dwell(self.generator.lead());
             self.planned_until = Seconds::ZERO;
             self.dwelt_until = Seconds::ZERO;
             self.run = Run::Active;
@@ -478,21 +497,26 @@ impl Planner {
         Ok(())
     }
 
+    /// A planned move has no steps: everything has to stop.
+    fn unsteppable(&mut self, error: PushError, line: Option<u32>) -> PrinterError {
+        self.is_broken = true;
+        let code = match error {
+            PushError::StepRate { .. } => ErrorCode::StepRateTooHigh,
+            _ => ErrorCode::Internal,
+        };
+        let error = PrinterError::new(code, error.to_string());
+        if let Some(line) = line { error.at_line(line) } else { error }
+    }
+
     fn take_planned(&mut self, planned: PlannedMove) -> Result<(), PrinterError> {
         if let Err(error) = self.step_rates.judge_planned(&planned) {
             self.is_broken = true;
             return Err(error);
         }
-        if let Err(error) = self.generator.push(&planned) {
-            self.is_broken = true;
-            let code = match error {
-                PushError::StepRate { .. } => ErrorCode::StepRateTooHigh,
-                _ => ErrorCode::Internal,
-            };
-            return Err(PrinterError::new(code, error.to_string()).at_line(planned.tag));
-        }
+        self.generator.push(&planned).map_err(|error| self.unsteppable(error, Some(planned.tag)))?;
         self.planned_until = Seconds(planned.end_time());
         self.moves_planned += 1;
+        self.course.planned(self.moves_planned, &mut self.generator);
         self.ready.push_back(Planned::Move(planned));
         while let Some(deferred) = self.deferred.pop_front_if(|deferred| deferred.after <= self.moves_planned)
         {

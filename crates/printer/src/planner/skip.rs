@@ -120,6 +120,7 @@ impl Skip {
             Action::TurnOffHeaters => self.targets.clear(),
             Action::Fan { index: 0, speed } => self.fan = speed,
             Action::VelocityLimit(limit) => planner.limit(limit),
+            Action::PressureAdvance { .. } | Action::InputShaper(_) => planner.set_dynamics(action),
             Action::Home { x, y, z } => {
                 let home = |axis: usize, is: bool| is.then_some(self.endstops[axis]);
                 source.interpreter.set_axes(home(0, x), home(1, y), home(2, z));

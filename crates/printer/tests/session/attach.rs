@@ -52,7 +52,7 @@ pub(crate) fn started(setup: &Setup, file: &str) -> (Bench, usize) {
 }
 
 /// Each motor's steps in their order.
-fn steps(bench: &mut Bench, from: usize) -> Vec<Vec<bool>> {
+pub(crate) fn steps(bench: &mut Bench, from: usize) -> Vec<Vec<bool>> {
     assert!(bench.state().motors.iter().all(|motor| motor.lost.0 == 0));
     let of = |wanted: usize| {
         let steps = bench.pulses()[from..].iter().filter(|(_, motor, _)| *motor == wanted);
@@ -61,7 +61,7 @@ fn steps(bench: &mut Bench, from: usize) -> Vec<Vec<bool>> {
     (0..4).map(of).collect()
 }
 
-fn clean(setup: &Setup, file: &str) -> (Vec<Vec<bool>>, Vec<Pulse>) {
+pub(crate) fn clean(setup: &Setup, file: &str) -> (Vec<Vec<bool>>, Vec<Pulse>) {
     let (mut bench, from) = started(setup, file);
     bench.job_over();
     bench.job_done();

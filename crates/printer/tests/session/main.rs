@@ -6,6 +6,7 @@ mod attach;
 mod bench;
 mod console;
 mod faults;
+mod filters;
 mod heaters;
 mod hold;
 mod link;

@@ -63,6 +63,8 @@ pub(crate) struct GcodePath<R> {
     begins: (u32, [f64; AXES]),
     fed_all: bool,
     ended: bool,
+    /// The file has changed pressure advance or an input shaper on the way.
+    pub(crate) filters: bool,
 }
 
 impl<R: MoreGcode> GcodePath<R> {
@@ -80,6 +82,7 @@ impl<R: MoreGcode> GcodePath<R> {
             begins: (0, [0.0; AXES]),
             fed_all: false,
             ended: false,
+            filters: false,
         }
     }
 
@@ -150,6 +153,7 @@ impl<R: MoreGcode> GcodePath<R> {
                     Action::Arc(arc) => self.chords = Some((arc.chords(CHORD_TOLERANCE), arc)),
                     Action::Home { x, y, z } => self.home([x, y, z])?,
                     Action::Cancel => self.ended = true,
+                    Action::PressureAdvance { .. } | Action::InputShaper(_) => self.filters = true,
                     _ => {}
                 }
                 continue;

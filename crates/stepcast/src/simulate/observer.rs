@@ -55,11 +55,15 @@ struct Aside {
 
 /// Follows a print.
 pub(super) struct Observer {
-    step_distance_mm: [f64; MOTORS],
+    pub(super) step_distance_mm: [f64; MOTORS],
     endstop_mm: [f64; 3],
     gcode: GcodePath<Input>,
     /// Steps of all moves that were scheduled.
     pub(super) planned: [u64; MOTORS],
+    /// Motors whose path is filtered: they make steps of their own, and end where the file wants them.
+    filtered: [bool; MOTORS],
+    /// Where the last move ends that was made for the file.
+    pub(super) end: Option<[f64; MOTORS]>,
     pub(super) moves: u64,
     pub(super) homing: Vec<Homing>,
     pub(super) pauses: u32,
@@ -107,6 +111,8 @@ impl Observer {
             endstop_mm: config.steppers.each_ref().map(|axis| axis.position_endstop.0),
             gcode: GcodePath::new(reference, printer::machine::gcode_settings(config)),
             planned: [0; MOTORS],
+            filtered: filtered(config),
+            end: None,
             moves: 0,
             homing: Vec::new(),
             pauses: 0,
@@ -229,6 +235,7 @@ impl Observer {
         }
         if self.aside.is_none() {
             self.plan_steps(scheduled);
+            self.end = Some(to);
         }
         let mut piece = Piece { line, from, to, bulge_mm: 0.0 };
         if !homing {
@@ -291,6 +298,11 @@ impl Observer {
         if self.is_taken_up { printer.motion_now().nearest(at.low()) } else { at }
     }
 
+    /// Whether a motor may make other steps than its moves alone would take.
+    pub(super) fn is_filtered(&self, motor: usize) -> bool {
+        self.filtered[motor] || self.gcode.filters
+    }
+
     /// Counts the steps of a move: those where it crosses half-way between two positions of a motor. An approach to an
     /// endstop counts by what was made of it, which comes with [`Event::Homed`].
     fn plan_steps(&mut self, scheduled: &ScheduledMove) {
@@ -344,6 +356,13 @@ impl Observer {
         }
         (!self.done).then(|| super::own_error("cancelled", "the job was cancelled before its end"))
     }
+}
+
+/// The motors on whose paths the machine file has a filter.
+fn filtered(config: &PrinterConfig) -> [bool; MOTORS] {
+    let [x, y] = config.input_shaper.each_ref().map(|shaper| shaper.shaper().is_some());
+    let e = config.extruder.as_ref().is_some_and(|extruder| !extruder.advance.is_none());
+    [x, y, false, e]
 }
 
 /// The number of the motor position nearest to a place; one exactly half-way belongs to the upper one.

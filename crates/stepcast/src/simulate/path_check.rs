@@ -146,14 +146,15 @@ pub(crate) struct PathCheck {
 
 impl PathCheck {
     /// A check for a machine with these step distances (X, Y, Z, extruder), standing at 0 with all counts 0.
-    pub(crate) fn new(step_distance_mm: [f64; 4], clock: Hertz) -> Self {
+    /// A motor may be early or late by `reach` besides.
+    pub(crate) fn new(step_distance_mm: [f64; 4], clock: Hertz, reach: Seconds) -> Self {
         Self {
             step_distance_mm,
             origin_mm: [0.0; 4],
             counts: [0; 4],
             position: [0.0; AXES],
             filament: 0.0,
-            tolerance: clock.ticks_in(BOUNDARY_TOLERANCE).0,
+            tolerance: clock.ticks_in(BOUNDARY_TOLERANCE + reach).0,
             segments: VecDeque::new(),
             aside: VecDeque::new(),
             quiet_from: 0,

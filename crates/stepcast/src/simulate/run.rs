@@ -181,7 +181,7 @@ impl Simulation {
         let board = demo_machine::fit(&mut config, board.as_ref())?;
         let machine = demo_machine::machine(&config)?;
         let step_distances = printer::machine::step_distances(&config).map(|distance| distance.0);
-        let tally = Tally::new(step_distances, board.clock);
+        let tally = Tally::new(step_distances, board.clock, config.shaper_reach());
         let host_hz = board.clock;
         let printer = VirtualPrinter::new(board, &machine, &faults, seed, tally)?;
         let start = printer.start();

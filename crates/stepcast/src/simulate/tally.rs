@@ -4,7 +4,7 @@
 //! that motion was held.
 
 use printer::machine::{EXTRUDER, MOTORS};
-use units::{Hertz, Ticks};
+use units::{Hertz, Seconds, Ticks};
 use virtual_printer::Recorder;
 
 use super::{digest::Digest, path_check::PathCheck};
@@ -32,11 +32,12 @@ pub(crate) struct Tally {
 
 impl Tally {
     /// Nothing has been seen of a machine with these step distances.
-    pub(crate) fn new(step_distance_mm: [f64; MOTORS], clock: Hertz) -> Self {
+    /// Input shapers may move an axis `reach` before its move, and after it.
+    pub(crate) fn new(step_distance_mm: [f64; MOTORS], clock: Hertz, reach: Seconds) -> Self {
         Self {
             pulses: [0; MOTORS],
             is_aside: false,
-            path: PathCheck::new(step_distance_mm, clock),
+            path: PathCheck::new(step_distance_mm, clock, reach),
             digest: Digest::default(),
             extruded_at: None,
             last_step: None,

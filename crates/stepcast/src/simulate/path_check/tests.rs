@@ -6,7 +6,7 @@ const CLOCK: Hertz = Hertz(1_000_000);
 const STEP_MM: f64 = 0.0125;
 
 fn check() -> PathCheck {
-    PathCheck::new([STEP_MM, STEP_MM, 0.0025, 0.007], CLOCK)
+    PathCheck::new([STEP_MM, STEP_MM, 0.0025, 0.007], CLOCK, Seconds::ZERO)
 }
 
 fn span(line: u32, start: u64, end: u64, from: [f64; 2], to: [f64; 2]) -> Span {

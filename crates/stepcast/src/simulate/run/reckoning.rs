@@ -110,9 +110,14 @@ fn wrong(
     if let Some(mismatch) = &observer.mismatch {
         return Some(mismatch.clone());
     }
-    for (name, motor) in motors {
-        let Motor { planned_steps, counted_steps, lost_steps, .. } = motor;
-        if planned_steps != counted_steps {
+    for (index, name) in MOTOR_NAMES.iter().enumerate() {
+        let Motor { planned_steps, counted_steps, lost_steps, end_position_mm } = &motors[name];
+        if observer.is_filtered(index) {
+            let end = observer.end.map_or(*end_position_mm, |end| end[index]);
+            if (end_position_mm - end).abs() > observer.step_distance_mm[index] {
+                return Some(format!("{name} stands at {end_position_mm} mm, the print ends at {end} mm"));
+            }
+        } else if planned_steps != counted_steps {
             return Some(format!(
                 "{name}: {planned_steps} steps were planned, {counted_steps} pulses were counted"
             ));
