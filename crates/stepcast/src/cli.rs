@@ -30,6 +30,8 @@ pub(crate) enum CommandLine {
     Simulate(SimulateArgs),
     /// Let things go wrong at random moments of many short prints, and check that every promise is kept
     Campaign(CampaignArgs),
+    /// Hold plans by the motors' torque against the best constant acceleration, on simulated motors of a heavy machine
+    Torque(TorqueArgs),
     /// Serve the virtual printer on a pseudo-terminal, in real time
     VirtualPrinter(VirtualPrinterArgs),
     /// Write a completion script for a shell to stdout
@@ -79,6 +81,16 @@ pub(crate) struct PlanArgs {
     /// Write the blocks that would be sent to a board into this file
     #[arg(long, value_name = "FILE")]
     pub(crate) dump_stream: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct TorqueArgs {
+    /// How many machines, whose parts differ by up to 10 %
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) seeds: u32,
+    /// Write the result as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// How speed goes up and down along the path.

@@ -10,6 +10,7 @@ mod console;
 mod input;
 mod plan;
 mod simulate;
+mod torque;
 mod virtual_printer;
 
 use std::process::ExitCode;
@@ -26,6 +27,7 @@ fn main() -> ExitCode {
         CommandLine::Plan(args) => (plan::run(args), args.json),
         CommandLine::Simulate(args) => (simulate::run(args), args.json),
         CommandLine::Campaign(args) => (campaign::run(args), args.json),
+        CommandLine::Torque(args) => (torque::run(args), args.json),
         CommandLine::VirtualPrinter(args) => (virtual_printer::run(args), false),
         CommandLine::Completions { shell } => (completions(*shell), false),
     };

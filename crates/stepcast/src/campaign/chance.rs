@@ -6,11 +6,11 @@ use rand_pcg::{Pcg32, rand_core::Rng};
 
 /// A stream of random numbers.
 #[derive(Clone, Debug)]
-pub(super) struct Chance(Pcg32);
+pub(crate) struct Chance(Pcg32);
 
 impl Chance {
     /// The stream of this number for a seed.
-    pub(super) fn new(seed: u64, stream: u64) -> Self {
+    pub(crate) fn new(seed: u64, stream: u64) -> Self {
         // SplitMix64's finaliser makes neighbouring seeds unrelated.
         let z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -19,27 +19,27 @@ impl Chance {
     }
 
     /// Evenly spread over 0..1.
-    pub(super) fn part(&mut self) -> f64 {
+    pub(crate) fn part(&mut self) -> f64 {
         f64::from(self.0.next_u32()) / (f64::from(u32::MAX) + 1.0)
     }
 
     /// Evenly spread over a range.
-    pub(super) fn between(&mut self, range: Range<f64>) -> f64 {
+    pub(crate) fn between(&mut self, range: Range<f64>) -> f64 {
         range.start + (range.end - range.start) * self.part()
     }
 
     /// Spread so that each order of magnitude of a range is as likely as the others.
-    pub(super) fn magnitude(&mut self, range: Range<f64>) -> f64 {
+    pub(crate) fn magnitude(&mut self, range: Range<f64>) -> f64 {
         libm::exp(self.between(libm::log(range.start)..libm::log(range.end)))
     }
 
     /// A number below `end`, which is not 0.
-    pub(super) fn below(&mut self, end: usize) -> usize {
+    pub(crate) fn below(&mut self, end: usize) -> usize {
         (self.part() * end as f64) as usize
     }
 
     /// One of these, of which there is at least one.
-    pub(super) fn pick<'a, T>(&mut self, of: &'a [T]) -> &'a T {
+    pub(crate) fn pick<'a, T>(&mut self, of: &'a [T]) -> &'a T {
         &of[self.below(of.len())]
     }
 }

@@ -30,9 +30,8 @@ use printer::{config::PrinterConfig, session::JobOptions};
 use units::{MmPerS2, Seconds};
 use virtual_printer::BoardProfile;
 
-pub(crate) use self::scenario::Scenario;
+pub(crate) use self::{chance::Chance, scenario::Scenario};
 use self::{
-    chance::Chance,
     judge::{Finding, Print, judge},
     report::{Broken, Class},
     scenario::{Case, Times},
