@@ -27,11 +27,19 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// The middle of the candidate's intervals.
-    fn new(candidate: Candidate, count: u32) -> Self {
-        let middle = floor(0.5 * (candidate.low + candidate.high));
-        let interval = middle.max(ceil(candidate.low)).max(1) as u32;
+    /// Of the candidate's intervals the one with which the last step comes nearest to `aim`, in ticks after the step before
+    /// the command: what follows starts there.
+    fn new(candidate: Candidate, count: u32, aim: f64) -> Self {
+        let n = f64::from(count);
+        let best = floor((aim - 0.5 * candidate.add * n * (n - 1.0)) / n + 0.5);
+        let interval = best.min(floor(candidate.high)).max(ceil(candidate.low)).max(1) as u32;
         Self { interval, add: if count == 1 { 0 } else { candidate.add as i16 }, count }
+    }
+
+    /// How far the last step is from `aim`.
+    fn off(&self, aim: f64) -> f64 {
+        let n = f64::from(self.count);
+        (n * f64::from(self.interval) + 0.5 * f64::from(self.add) * n * (n - 1.0) - aim).abs()
     }
 }
 
@@ -211,15 +219,16 @@ impl Stabbing {
     /// The best command for the windows taken: it covers all of them where integers allow, at least one otherwise.
     ///
     /// At least one window must have been taken.
-    pub(crate) fn fit(&self) -> Fit {
+    pub(crate) fn fit(&self, aim: f64) -> Fit {
         if self.followed > 0 {
-            let cost = |c: &&Candidate| (!ADD_SHORT.contains(&(c.add as i64)), c.add.abs() as i64);
-            let best = self.candidates[..self.followed].iter().min_by_key(cost);
-            return Fit::new(best.copied().unwrap_or_default(), self.count);
+            let fits = self.candidates[..self.followed].iter().map(|&candidate| Fit::new(candidate, self.count, aim));
+            let cost = |fit: &Fit| fit.off(aim) + if ADD_SHORT.contains(&i64::from(fit.add)) { 0.0 } else { 1e9 };
+            let best = fits.min_by(|a, b| cost(a).total_cmp(&cost(b)));
+            return best.unwrap_or(Fit { interval: 1, add: 0, count: 1 });
         }
         if self.count == 1 {
             let (low, high) = self.slits[0];
-            return Fit::new(Candidate { add: 0.0, low, high }, 1);
+            return Fit::new(Candidate { add: 0.0, low, high }, 1, aim);
         }
         let first = ceil(2.0 * self.flattest.slope);
         let last = floor(2.0 * self.steepest.slope);
@@ -233,14 +242,14 @@ impl Stabbing {
         for add in tries().filter(|add| (first..=last).contains(add)) {
             let candidate = self.candidate(add);
             if has_integer(candidate.low, candidate.high) {
-                return Fit::new(candidate, self.count);
+                return Fit::new(candidate, self.count, aim);
             }
         }
-        self.longest(tries())
+        self.longest(tries(), aim)
     }
 
     /// The candidate that passes the most windows from the first on.
-    fn longest(&self, adds: impl Iterator<Item = i64>) -> Fit {
+    fn longest(&self, adds: impl Iterator<Item = i64>, aim: f64) -> Fit {
         let mut best = (Candidate { add: 0.0, low: self.slits[0].0, high: self.slits[0].1 }, 1);
         for add in adds {
             let add = add as f64;
@@ -260,7 +269,7 @@ impl Stabbing {
                 best = (reached, count);
             }
         }
-        Fit::new(best.0, best.1)
+        Fit::new(best.0, best.1, aim)
     }
 }
 
