@@ -13,21 +13,25 @@
 
 mod ability;
 mod bound;
+mod jerk;
 mod junction;
 mod limits;
 mod look_ahead;
 mod motor;
 mod planned;
+mod s_curve;
 mod window;
 
 pub use bound::Bound;
 pub use limits::{ExtruderLimits, Limits, LimitsError};
 pub use look_ahead::{
-    LOOK_AHEAD_MOVES_MAX, LookAhead, MoveError, MoveRequest, READY_MOVES_MAX, RUN_TIME_MAX,
+    LOOK_AHEAD_MOVES_MAX, LookAhead, MoveError, MoveRequest, Profile, READY_MOVES_MAX, RUN_TIME_MAX,
 };
 pub use motor::{Demand, MotorAbility, TORQUE_POINTS_MAX, Torque, TorqueError};
 pub use planned::{Phase, PlannedMove};
 
+#[cfg(test)]
+mod jerk_tests;
 #[cfg(test)]
 mod motor_tests;
 #[cfg(test)]

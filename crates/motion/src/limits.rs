@@ -69,6 +69,9 @@ pub enum LimitsError {
     /// A value outside its range.
     #[error("{0} is out of its range")]
     OutOfRange(&'static str),
+    /// Two ways to shape ramps that do not go together.
+    #[error("the jerk cannot be limited where a motor's torque is given: leave out max_jerk or motor_torque")]
+    JerkWithTorque,
 }
 
 /// Above this, a speed or an acceleration is a typing error; it keeps every square finite.

@@ -1,11 +1,12 @@
 //! Moves in, trapezoids out: the bounded window with what may be pushed into it.
 
+use crate::jerk::JerkLimiter;
 use crate::junction::Entry;
 use crate::window::Window;
 use crate::{Limits, LimitsError, MotorAbility, PlannedMove};
 use std::collections::VecDeque;
 use thiserror::Error;
-use units::{MmPerS, Seconds};
+use units::{MmPerS, MmPerS3, Seconds};
 
 /// The most moves whose speeds are still open. A window of 8 is within 0.1 % of an endless one on usual prints.
 pub const LOOK_AHEAD_MOVES_MAX: usize = 1024;
@@ -15,6 +16,9 @@ pub const READY_MOVES_MAX: usize = 4 * LOOK_AHEAD_MOVES_MAX;
 pub const RUN_TIME_MAX: Seconds = Seconds(1e7);
 /// Moves are planned in batches: the backward pass visits the whole window.
 const BATCH_MOVES: usize = 16;
+/// Jerks outside of this are typing errors.
+const JERK_MIN_MM_S3: f64 = 100.0;
+const JERK_MAX_MM_S3: f64 = 1e9;
 /// Farther out (mm) no printer reaches, and single steps would drown in rounding.
 const COORDINATE_MAX_MM: f64 = 1e9;
 /// A move must start this close (mm) to where the one before it ended.
@@ -53,11 +57,39 @@ pub enum MoveError {
     Full,
 }
 
+/// What shapes the speed along the path besides the limits.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Profile {
+    /// Motors that have less torque the faster they turn: one entry for each of x, y, z and the extruder, or none at all.
+    pub motors: Vec<Option<MotorAbility>>,
+    /// The fastest that the acceleration along the path may change.
+    pub max_jerk: Option<MmPerS3>,
+}
+
+/// The limiter for a jerk, if there is one.
+fn limiter(
+    max_jerk: Option<MmPerS3>,
+    motors: &[Option<MotorAbility>],
+) -> Result<Option<JerkLimiter>, LimitsError> {
+    let Some(MmPerS3(jerk)) = max_jerk else { return Ok(None) };
+    if !(JERK_MIN_MM_S3..=JERK_MAX_MM_S3).contains(&jerk) {
+        return Err(LimitsError::OutOfRange("max_jerk"));
+    }
+    if motors.iter().any(Option::is_some) {
+        return Err(LimitsError::JerkWithTorque);
+    }
+    Ok(Some(JerkLimiter::new(jerk)))
+}
+
 /// Plans moves ahead. See the crate's head for the model.
 #[derive(Clone, Debug)]
 pub struct LookAhead {
     limits: Limits,
     window: Window,
+    /// Where the jerk is limited too.
+    limiter: Option<JerkLimiter>,
+    /// What the window has released and the limiter has yet to take.
+    released: VecDeque<PlannedMove>,
     ready: VecDeque<PlannedMove>,
     /// Print time at which the last released move ends, s.
     print_time: f64,
@@ -78,12 +110,20 @@ impl LookAhead {
     /// The same for a machine of whose motors some have less torque the faster they turn: one entry for each of x, y, z
     /// and the extruder, or none at all.
     pub fn with_motors(limits: Limits, motors: Vec<Option<MotorAbility>>) -> Result<Self, LimitsError> {
+        Self::with_profile(limits, Profile { motors, max_jerk: None })
+    }
+
+    /// The same with all that shapes the speed along the path.
+    pub fn with_profile(limits: Limits, profile: Profile) -> Result<Self, LimitsError> {
+        let Profile { motors, max_jerk } = profile;
         limits.check()?;
         // What limits nothing costs nothing.
         let motors = if motors.iter().any(Option::is_some) { motors } else { Vec::new() };
         Ok(Self {
             limits,
+            limiter: limiter(max_jerk, &motors)?,
             window: Window::new(motors),
+            released: VecDeque::new(),
             ready: VecDeque::new(),
             print_time: 0.0,
             planned_position: None,
@@ -108,6 +148,7 @@ impl LookAhead {
     /// taken are forgotten.
     pub fn begin_run(&mut self) {
         self.window.clear();
+        self.limiter.iter_mut().for_each(JerkLimiter::begin_run);
         self.ready.clear();
         self.print_time = 0.0;
         self.planned_position = None;
@@ -141,10 +182,10 @@ impl LookAhead {
         self.unplanned += 1;
         if self.unplanned >= BATCH_MOVES {
             self.unplanned = 0;
-            self.window.release_final(&mut self.print_time, &mut self.ready);
+            self.release(Window::release_final);
         }
         if self.window.len() >= LOOK_AHEAD_MOVES_MAX {
-            self.window.release_oldest(LOOK_AHEAD_MOVES_MAX / 2, &mut self.print_time, &mut self.ready);
+            self.release(|window, time, out| window.release_oldest(LOOK_AHEAD_MOVES_MAX / 2, time, out));
         }
         Ok(())
     }
@@ -152,7 +193,21 @@ impl LookAhead {
     /// Everything pushed so far ends at rest and can be taken.
     pub fn flush(&mut self) {
         self.unplanned = 0;
-        self.window.release_oldest(usize::MAX, &mut self.print_time, &mut self.ready);
+        self.release(|window, time, out| window.release_oldest(usize::MAX, time, out));
+        if let Some(limiter) = &mut self.limiter {
+            limiter.flush(&mut self.ready);
+        }
+    }
+
+    /// Lets the window release moves, through the limiter where there is one.
+    fn release(&mut self, how: impl FnOnce(&mut Window, &mut f64, &mut VecDeque<PlannedMove>)) {
+        let Some(limiter) = &mut self.limiter else {
+            return how(&mut self.window, &mut self.print_time, &mut self.ready);
+        };
+        how(&mut self.window, &mut self.print_time, &mut self.released);
+        for planned in self.released.drain(..) {
+            limiter.push(planned, &mut self.ready);
+        }
     }
 
     /// The machine waits at rest: everything pushed so far ends, and the next move starts `pause` later. Negative
@@ -160,7 +215,8 @@ impl LookAhead {
     pub fn dwell(&mut self, pause: Seconds) {
         self.flush();
         if pause.0 > 0.0 {
-            self.print_time = (self.print_time + pause.0).min(RUN_TIME_MAX.0);
+            self.print_time = (self.print_time().0 + pause.0).min(RUN_TIME_MAX.0);
+            self.limiter.iter_mut().for_each(|limiter| limiter.dwell_until(self.print_time));
         }
     }
 
@@ -171,24 +227,26 @@ impl LookAhead {
 
     /// Moves that have been pushed and not been taken.
     pub fn len(&self) -> usize {
-        self.window.len() + self.ready.len()
+        self.window.len() + self.limiter.as_ref().map_or(0, JerkLimiter::len) + self.ready.len()
     }
 
     /// Whether everything pushed has been taken.
     pub fn is_empty(&self) -> bool {
-        self.window.is_empty() && self.ready.is_empty()
+        self.len() == 0
     }
 
     /// How long the moves that have not been taken will last, at least: those in the window count as if they ran at
     /// full speed throughout.
     pub fn pending_time(&self) -> Seconds {
-        let taken_until = self.ready.front().map_or(self.print_time, |planned| planned.start_time);
-        Seconds(self.print_time + self.window.nominal_time() - taken_until)
+        let print_time = self.print_time().0;
+        let taken_until = self.ready.front().map_or(print_time, |planned| planned.start_time);
+        let limited = self.limiter.as_ref().map_or(0.0, JerkLimiter::pending_time);
+        Seconds(print_time + limited + self.window.nominal_time() - taken_until)
     }
 
     /// Print time at which the last final move ends.
-    pub const fn print_time(&self) -> Seconds {
-        Seconds(self.print_time)
+    pub fn print_time(&self) -> Seconds {
+        Seconds(self.limiter.as_ref().map_or(self.print_time, JerkLimiter::print_time))
     }
 
     /// Where the last move pushed in this run ends: x, y, z, e in mm.

@@ -170,6 +170,32 @@ impl PlannedMove {
         planned
     }
 
+    /// The same move at another time and with other phases, which go from its start to its end.
+    pub(crate) fn reshaped(&self, mut phases: Vec<Phase>, start_time: f64) -> Self {
+        if let Some(first) = phases.first_mut() {
+            first.start_distance = 0.0;
+        }
+        if let Some(last) = phases.last_mut() {
+            last.end_distance = self.length;
+        }
+        let at_end = |phase: &Phase| phase.velocity_at(phase.duration);
+        let time = |is_counted: fn(f64) -> bool| {
+            let counted = phases.iter().filter(|phase| is_counted(at_end(phase) - phase.velocity));
+            counted.map(|phase| phase.duration).sum::<f64>()
+        };
+        Self {
+            start_time,
+            accel_time: time(|change| change > 0.0),
+            cruise_time: time(|change| change == 0.0),
+            decel_time: time(|change| change < 0.0),
+            start_velocity: phases.first().map_or(0.0, |first| first.velocity),
+            cruise_velocity: phases.iter().map(|phase| phase.velocity.max(at_end(phase))).fold(0.0, f64::max),
+            end_velocity: phases.last().map_or(0.0, at_end),
+            shape: Some(phases.into()),
+            ..self.clone()
+        }
+    }
+
     fn shape_trapezoid(&mut self, start_v2: f64, cruise_v2: f64, end_v2: f64) {
         let half_inverse = 0.5 / self.accel;
         let accel_length = (cruise_v2 - start_v2) * half_inverse;

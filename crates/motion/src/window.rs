@@ -61,10 +61,6 @@ impl Window {
         self.entries.len()
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.entries.is_empty()
-    }
-
     /// The least time in which these moves can run, s.
     pub(crate) fn nominal_time(&self) -> f64 {
         self.nominal_time

@@ -3,7 +3,7 @@
 //! Knows the order of motors, which is the same everywhere: X, Y, Z, extruder.
 
 use gcode::VelocityLimit;
-use motion::{ExtruderLimits, Limits};
+use motion::{ExtruderLimits, Limits, Profile};
 use steps::{Cartesian, StepGenerator, StepperSpec};
 use units::{Hertz, Mm, MmPerS, MmPerS2, Seconds};
 
@@ -85,6 +85,11 @@ pub fn limits(config: &PrinterConfig) -> Limits {
         junction_deviation: printer.junction_deviation,
         extruder,
     }
+}
+
+/// What shapes the speed along the path besides the limits.
+pub fn profile(config: &PrinterConfig) -> Profile {
+    Profile { motors: config.abilities.to_vec(), max_jerk: config.printer.max_jerk }
 }
 
 /// The limits after a file's own: it may ask for less than the machine file allows, never for more.

@@ -67,12 +67,29 @@ pub(crate) struct PlanArgs {
     /// Work out the least time that the same moves could take under the same limits, on a fine grid
     #[arg(long)]
     pub(crate) bound: bool,
+    /// How speed goes up and down, where not as the machine file says
+    #[arg(long, value_enum)]
+    pub(crate) profile: Option<Profile>,
+    /// With `--profile jerk`: the jerk in mm/s³, instead of the machine file's max_jerk
+    #[arg(long, value_name = "MM/S3", value_parser = jerk, requires = "profile")]
+    pub(crate) max_jerk: Option<f64>,
     /// Plan with this minimum_cruise_ratio instead of the machine's
     #[arg(long, value_name = "RATIO", value_parser = ratio)]
     pub(crate) minimum_cruise_ratio: Option<f64>,
     /// Write the blocks that would be sent to a board into this file
     #[arg(long, value_name = "FILE")]
     pub(crate) dump_stream: Option<PathBuf>,
+}
+
+/// How speed goes up and down along the path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Profile {
+    /// At a constant acceleration
+    Trapezoid,
+    /// As the motors' torque allows, from the machine file's [motor_torque …]
+    Torque,
+    /// With a limited jerk
+    Jerk,
 }
 
 /// The board that is simulated.
@@ -218,6 +235,10 @@ fn speed(text: &str) -> Result<f64, String> {
 
 fn factor(text: &str) -> Result<f64, String> {
     number(text, "a factor from 0.01 to 100", |value| (0.01..=100.0).contains(&value))
+}
+
+fn jerk(text: &str) -> Result<f64, String> {
+    number(text, "a jerk from 1000 to 1e7 mm/s³", |value| (1e3..=1e7).contains(&value))
 }
 
 fn ratio(text: &str) -> Result<f64, String> {

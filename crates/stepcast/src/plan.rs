@@ -12,12 +12,13 @@ use std::{
 use anyhow::Context;
 use printer::{
     machine::MOTOR_NAMES,
-    planner::{PlanOptions, PlanReport, PlanStream},
+    planner::{PlanOptions, PlanReport, PlanStream, Ramps},
 };
 use serde::Serialize;
+use units::MmPerS3;
 
 use crate::{
-    cli::PlanArgs,
+    cli::{PlanArgs, Profile},
     config_file,
     console::{self, Progress},
     input::Input,
@@ -74,6 +75,11 @@ pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
         feed_scale: args.feed_scale,
         bound: args.bound,
         minimum_cruise_ratio: args.minimum_cruise_ratio,
+        ramps: args.profile.map(|profile| match profile {
+            Profile::Trapezoid => Ramps::Even,
+            Profile::Torque => Ramps::Torque,
+            Profile::Jerk => Ramps::Jerk(args.max_jerk.map(MmPerS3)),
+        }),
     };
     let mut stream = PlanStream::with_options(&config, options)?;
     let mut blocks = Vec::new();

@@ -116,6 +116,10 @@ quantity!(
     MmPerS2, " mm/s²"
 );
 quantity!(
+    /// A jerk: how fast an acceleration changes.
+    MmPerS3, " mm/s³"
+);
+quantity!(
     /// A duration or a point in time, in seconds.
     Seconds, " s"
 );

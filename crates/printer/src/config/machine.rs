@@ -1,6 +1,6 @@
 //! `[mcu]`, `[printer]` and the small sections about the machine as a whole.
 
-use units::{Mm, MmPerS, MmPerS2, Seconds};
+use units::{Mm, MmPerS, MmPerS2, MmPerS3, Seconds};
 
 use super::Builder;
 use super::diagnostics::excerpt;
@@ -64,6 +64,8 @@ pub struct MachineConfig {
     pub junction_deviation: Option<Mm>,
     /// What becomes of a move that is faster than its motors' torque allows (an option of our own).
     pub unreachable_speed: UnreachableSpeed,
+    /// The fastest that the acceleration along the path may change (an option of our own); not limited where not given.
+    pub max_jerk: Option<MmPerS3>,
 }
 
 /// `[idle_timeout]`.
@@ -97,6 +99,9 @@ const STANDBY_TIME_MAX_S: f64 = 14_400.0;
 /// Clear of the part, and back in a second.
 const PAUSE_LIFT_MM: f64 = 5.0;
 const PAUSE_LIFT_MAX_MM: f64 = 100.0;
+/// Slower changes of the acceleration would take minutes, faster ones are none.
+const JERK_MIN: f64 = 1_000.0;
+const JERK_MAX: f64 = 1e7;
 /// Beyond a millimetre a corner is none.
 const JUNCTION_DEVIATION_MAX_MM: f64 = 1.0;
 /// At 1 the head could not speed up at all.
@@ -158,6 +163,7 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
     let xy_accel = ["max_x_accel", "max_y_accel"].map(|name| reader.optional_number(name, accel));
     let junction_deviation =
         reader.optional_number("junction_deviation", Range::from(0.0).to(JUNCTION_DEVIATION_MAX_MM));
+    let max_jerk = reader.optional_number("max_jerk", Range::from(JERK_MIN).to(JERK_MAX));
     let unreachable_speed = match reader.text("unreachable_speed").as_deref() {
         None | Some("clamp") => Ok(UnreachableSpeed::Clamp),
         Some("reject") => Ok(UnreachableSpeed::Reject),
@@ -187,6 +193,7 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
         max_xy_accel: [max_x_accel?, max_y_accel?].map(|it| MmPerS2(it.unwrap_or(f64::INFINITY))),
         junction_deviation: junction_deviation?.map(Mm),
         unreachable_speed: unreachable_speed?,
+        max_jerk: max_jerk?.map(MmPerS3),
     })
 }
 

@@ -137,6 +137,13 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
     let [mx, my, mz] = motors;
     let motors = [("stepper_x", mx), ("stepper_y", my), ("stepper_z", mz), ("extruder", feeder)];
     let abilities = motors.map(|(name, motor)| torque::motor_torque(&mut builder, name, motor.as_ref()));
+    if printer.as_ref().is_ok_and(|it| it.max_jerk.is_some())
+        && abilities.iter().any(|it| it.as_ref().is_ok_and(Option::is_some))
+    {
+        let problem =
+            "[printer] max_jerk cannot be used together with [motor_torque …]: leave out one of them";
+        builder.log.error(0, problem);
+    }
     rest::report(builder.document.into_rest(), builder.log);
     Ok(PrinterConfig {
         mcu: mcu?,

@@ -24,7 +24,7 @@ use units::{Hertz, MmPerS, Seconds, Ticks};
 use dynamics::Course;
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
-pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanStream};
+pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanStream, Ramps};
 pub(crate) use skip::{Skip, Skipped};
 pub(crate) use source::Next;
 pub use source::{SOURCE_BYTES_MAX, Source};
@@ -106,7 +106,7 @@ impl Planner {
     /// A planner for a machine and a board's clock. No axis is homed, and the machine stands at 0, 0, 0.
     pub fn new(config: &PrinterConfig, clock: Hertz) -> Result<Self, PrinterError> {
         let limits = machine::limits(config);
-        let look_ahead = LookAhead::with_motors(limits, config.abilities.to_vec())
+        let look_ahead = LookAhead::with_profile(limits, machine::profile(config))
             .map_err(|error| PrinterError::new(ErrorCode::ConfigInvalid, error.to_string()))?;
         Ok(Self {
             guard: Guard::new(config),

@@ -2,7 +2,7 @@
 
 use motion::PlannedMove;
 use steps::{StepCommand, StepCommandKind};
-use units::{Hertz, Seconds};
+use units::{Hertz, MmPerS3, Seconds};
 use wire::{
     Command,
     block::{Block, PAYLOAD_BYTES_MAX},
@@ -11,7 +11,7 @@ use wire::{
 use super::{Barrier, Planned, Planner, Source};
 use crate::{
     config::PrinterConfig,
-    error::PrinterError,
+    error::{ErrorCode, PrinterError},
     machine::{self, EXTRUDER, MOTORS},
 };
 
@@ -57,11 +57,48 @@ pub struct PlanOptions {
     pub bound: bool,
     /// The machine's minimum cruise ratio, where another is wanted.
     pub minimum_cruise_ratio: Option<f64>,
+    /// How ramps are shaped, where not as the machine file says.
+    pub ramps: Option<Ramps>,
+}
+
+/// How speed goes up and down along the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ramps {
+    /// At the acceleration of the limits, whatever else the machine file says.
+    Even,
+    /// As the motors' torque allows: the machine file has to say what that is.
+    Torque,
+    /// With no more jerk than this, or than the machine file says.
+    Jerk(Option<MmPerS3>),
+}
+
+impl Ramps {
+    fn apply(self, config: &mut PrinterConfig) -> Result<(), PrinterError> {
+        let wrong = |what: &str| Err(PrinterError::new(ErrorCode::ConfigInvalid, what));
+        match self {
+            Self::Even => {
+                config.abilities = Default::default();
+                config.printer.max_jerk = None;
+            }
+            Self::Torque if config.abilities.iter().all(Option::is_none) => {
+                return wrong("the machine file has no [motor_torque …] section");
+            }
+            Self::Torque => config.printer.max_jerk = None,
+            Self::Jerk(jerk) => {
+                config.abilities = Default::default();
+                config.printer.max_jerk = jerk.or(config.printer.max_jerk);
+                if config.printer.max_jerk.is_none() {
+                    return wrong("the machine file has no max_jerk in [printer]");
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        Self { feed_scale: 1.0, bound: false, minimum_cruise_ratio: None }
+        Self { feed_scale: 1.0, bound: false, minimum_cruise_ratio: None, ramps: None }
     }
 }
 
@@ -89,6 +126,9 @@ impl PlanStream {
         let mut config = config.clone();
         if let Some(ratio) = options.minimum_cruise_ratio {
             config.printer.minimum_cruise_ratio = ratio;
+        }
+        if let Some(ramps) = options.ramps {
+            ramps.apply(&mut config)?;
         }
         let config = &config;
         let mut planner = Planner::new(config, PLAN_CLOCK)?;

@@ -40,7 +40,7 @@ impl Estimate {
         let limits = machine::limits(config);
         Some(Self {
             machine: limits,
-            look_ahead: LookAhead::with_motors(limits, config.abilities.to_vec()).ok()?,
+            look_ahead: LookAhead::with_profile(limits, machine::profile(config)).ok()?,
             lines: VecDeque::new(),
             step_rates: StepRates::new(config, PLAN_CLOCK),
             too_fast: None,

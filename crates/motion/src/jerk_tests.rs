@@ -1,0 +1,147 @@
+//! Plans with a limited jerk: what holds at every moment, and what it costs.
+
+use crate::{ExtruderLimits, Limits, LookAhead, MoveRequest, PlannedMove, Profile};
+use proptest::prelude::*;
+use units::{Mm, MmPerS, MmPerS2, MmPerS3, Seconds};
+
+fn limits(accel: f64) -> Limits {
+    Limits {
+        max_velocity: MmPerS(300.0),
+        max_accel: MmPerS2(accel),
+        square_corner_velocity: MmPerS(5.0),
+        minimum_cruise_ratio: 0.0,
+        max_z_velocity: MmPerS(15.0),
+        max_z_accel: MmPerS2(200.0),
+        max_xy_velocity: Limits::ANY_VELOCITY,
+        max_xy_accel: Limits::ANY_ACCEL,
+        junction_deviation: None,
+        extruder: ExtruderLimits::for_nozzle(Mm(0.4), Mm(1.75), MmPerS(300.0), MmPerS2(accel)),
+    }
+}
+
+fn plan(points: &[([f64; 4], f64)], limits: Limits, jerk: Option<f64>) -> Vec<PlannedMove> {
+    let profile = Profile { motors: Vec::new(), max_jerk: jerk.map(MmPerS3) };
+    let mut look_ahead = LookAhead::with_profile(limits, profile).unwrap();
+    let mut from = [0.0; 4];
+    let mut planned = Vec::new();
+    for (tag, &(to, feed)) in points.iter().enumerate() {
+        look_ahead.push(&MoveRequest { from, to, feed: MmPerS(feed), tag: tag as u32 }).unwrap();
+        planned.extend(std::iter::from_fn(|| look_ahead.pop()));
+        from = to;
+    }
+    look_ahead.flush();
+    planned.extend(std::iter::from_fn(|| look_ahead.pop()));
+    assert!(look_ahead.is_empty());
+    assert_eq!(look_ahead.print_time(), Seconds(planned.last().map_or(0.0, PlannedMove::end_time)));
+    planned
+}
+
+/// Asserts that speed and acceleration go on without a jump, within their limits and below the trapezoids' speeds.
+fn check(made: &[PlannedMove], trapezoids: &[PlannedMove], jerk: f64) {
+    assert_eq!(made.len(), trapezoids.len());
+    let (mut time, mut speed, mut accel) = (0.0, 0.0, 0.0);
+    let mut direction: Option<[f64; 4]> = None;
+    for (one, limit) in made.iter().zip(trapezoids) {
+        assert_eq!((one.tag, one.from, one.to, one.length), (limit.tag, limit.from, limit.to, limit.length));
+        assert!((one.start_time - time).abs() < 1e-9);
+        time = one.end_time();
+        let near = |a: f64, b: f64, scale: f64| (a - b).abs() <= 1e-5 * scale;
+        let mut distance = 0.0;
+        let turn: f64 =
+            direction.map_or(1.0, |before| (0..3).map(|axis| before[axis] * one.direction[axis]).sum());
+        direction = Some(one.direction);
+        if turn < 0.9962 && speed > 0.0 {
+            accel = one.phases().next().unwrap().accel;
+        }
+        for phase in one.phases() {
+            assert!(phase.jerk.abs() <= jerk * (1.0 + 1e-9), "{phase:?}");
+            assert!(near(phase.velocity, speed, 100.0), "{phase:?} after {speed}");
+            assert!(near(phase.accel, accel, limit.accel), "{phase:?} after {accel}");
+            assert!(near(phase.start_distance, distance, 1.0));
+            distance = phase.distance_at(phase.duration);
+            assert!(near(phase.end_distance, distance, 1.0), "{phase:?} {distance}");
+            speed = phase.velocity_at(phase.duration);
+            accel = phase.accel + phase.jerk * phase.duration;
+            for part in 0..=4 {
+                let at = phase.velocity_at(phase.duration * f64::from(part) / 4.0);
+                assert!(at >= -1e-6 && at <= limit.cruise_velocity * (1.0 + 1e-6) + 1e-6, "{at} {limit:?}");
+                let pull = phase.accel + phase.jerk * phase.duration * f64::from(part) / 4.0;
+                assert!(pull.abs() <= limit.accel * (1.0 + 1e-6), "{pull} of {}", limit.accel);
+            }
+        }
+        assert!(near(distance, one.length, 1.0));
+        assert!(one.end_velocity <= limit.end_velocity * (1.0 + 1e-6) + 1e-6, "{one:?} {limit:?}");
+    }
+    assert!(speed.abs() < 1e-3 && accel.abs() < 1.0, "{speed} {accel}");
+}
+
+#[test]
+fn a_long_move_has_seven_phases() {
+    let made = plan(&[([100.0, 0.0, 0.0, 0.0], 200.0)], limits(3000.0), Some(1e5));
+    let phases: Vec<_> = made[0].phases().collect();
+    assert_eq!(phases.len(), 7);
+    // Δ/a + a/j both ways, and the rest along.
+    assert!((made[0].accel_time - (200.0 / 3000.0 + 0.03)).abs() < 1e-9);
+    assert!((made[0].decel_time - made[0].accel_time).abs() < 1e-9);
+    assert!((made[0].cruise_velocity - 200.0).abs() < 1e-9);
+    check(&made, &plan(&[([100.0, 0.0, 0.0, 0.0], 200.0)], limits(3000.0), None), 1e5);
+}
+
+#[test]
+fn a_ramp_over_many_straight_pieces_is_that_of_one_move() {
+    let whole = plan(&[([50.0, 0.0, 0.0, 0.0], 200.0)], limits(3000.0), Some(1e5));
+    let pieces: Vec<_> = (1..=500).map(|index| ([0.1 * f64::from(index), 0.0, 0.0, 0.0], 200.0)).collect();
+    let made = plan(&pieces, limits(3000.0), Some(1e5));
+    let (a, b) = (whole[0].duration(), made.last().unwrap().end_time());
+    assert!((a - b).abs() < 1e-6, "{a} {b}");
+}
+
+#[test]
+fn a_jerk_without_bounds_costs_nothing() {
+    let points: Vec<_> = (0..200)
+        .map(|index| ([f64::from(index % 7) * 9.0, f64::from(index % 5) * 11.0, 0.0, 0.0], 150.0))
+        .skip(1)
+        .collect();
+    let time = |jerk| plan(&points, limits(3000.0), jerk).last().unwrap().end_time();
+    let ratio = time(Some(1e9)) / time(None);
+    assert!((1.0..1.001).contains(&ratio), "{ratio}");
+}
+
+fn any_points() -> impl Strategy<Value = Vec<([f64; 4], f64)>> {
+    let step = (0.0..core::f64::consts::TAU, 0.01..1.0_f64, 0.0..1.0_f64, 5.0..300.0_f64);
+    proptest::collection::vec(step, 1..1500).prop_map(|steps| {
+        let mut at = [0.0; 4];
+        let mut heading = 0.0;
+        let mut speed = 100.0;
+        let point = |(turn, length, kind, feed): (f64, f64, f64, f64)| {
+            heading += if kind < 0.9 { 0.05 * (turn - 3.0) } else { turn };
+            let length = if kind < 0.7 { length } else { 20.0 * length };
+            if kind > 0.8 {
+                speed = feed;
+            }
+            let z = if kind > 0.99 { 0.3 } else { 0.0 };
+            at = [
+                at[0] + length * libm::cos(heading),
+                at[1] + length * libm::sin(heading),
+                at[2] + z,
+                at[3] + 0.03 * length,
+            ];
+            (at, speed)
+        };
+        steps.into_iter().map(point).collect()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn no_jerk_is_above_its_limit_and_no_speed_above_the_trapezoids(
+        points in any_points(),
+        accel in 500.0..20_000.0_f64,
+        jerk in prop_oneof![1e3..1e5_f64, 1e5..1e7_f64],
+    ) {
+        let limits = limits(accel);
+        check(&plan(&points, limits, Some(jerk)), &plan(&points, limits, None), jerk);
+    }
+}
