@@ -221,8 +221,11 @@ impl Stabbing {
     /// At least one window must have been taken.
     pub(crate) fn fit(&self, aim: f64) -> Fit {
         if self.followed > 0 {
-            let fits = self.candidates[..self.followed].iter().map(|&candidate| Fit::new(candidate, self.count, aim));
-            let cost = |fit: &Fit| fit.off(aim) + if ADD_SHORT.contains(&i64::from(fit.add)) { 0.0 } else { 1e9 };
+            let fits = self.candidates[..self.followed]
+                .iter()
+                .map(|&candidate| Fit::new(candidate, self.count, aim));
+            let cost =
+                |fit: &Fit| fit.off(aim) + if ADD_SHORT.contains(&i64::from(fit.add)) { 0.0 } else { 1e9 };
             let best = fits.min_by(|a, b| cost(a).total_cmp(&cost(b)));
             return best.unwrap_or(Fit { interval: 1, add: 0, count: 1 });
         }
