@@ -224,9 +224,12 @@ impl Stabbing {
             let fits = self.candidates[..self.followed]
                 .iter()
                 .map(|&candidate| Fit::new(candidate, self.count, aim));
-            let cost =
-                |fit: &Fit| fit.off(aim) + if ADD_SHORT.contains(&i64::from(fit.add)) { 0.0 } else { 1e9 };
-            let best = fits.min_by(|a, b| cost(a).total_cmp(&cost(b)));
+            // A short `add` first, then the end; a tie is not left to the order of the candidates, which trials change.
+            let best = fits.min_by(|a, b| {
+                let long = |fit: &Fit| !ADD_SHORT.contains(&i64::from(fit.add));
+                let ends = || a.off(aim).total_cmp(&b.off(aim));
+                long(a).cmp(&long(b)).then_with(ends).then(a.add.cmp(&b.add))
+            });
             return best.unwrap_or(Fit { interval: 1, add: 0, count: 1 });
         }
         if self.count == 1 {
