@@ -193,6 +193,18 @@ impl Stabbing {
     fn follow(&mut self, x: f64, low: f64, high: f64) -> bool {
         let half_x = 0.5 * x;
         let before = self.followed;
+        // The usual case in a long command.
+        if before == 1 {
+            let candidate = &mut self.candidates[0];
+            let rise = candidate.add * half_x;
+            let next_low = larger(candidate.low, low - rise);
+            let next_high = smaller(candidate.high, high - rise);
+            let passes = has_integer(next_low, next_high);
+            if passes {
+                (candidate.low, candidate.high) = (next_low, next_high);
+            }
+            return passes;
+        }
         let mut index = 0;
         while index < self.followed {
             let candidate = &mut self.candidates[index];
