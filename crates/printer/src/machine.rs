@@ -110,10 +110,13 @@ pub fn lowered(machine: &Limits, current: &Limits, limit: &VelocityLimit) -> Lim
     limits
 }
 
-/// A step generator for the machine's motors.
-pub fn step_generator(config: &PrinterConfig, clock: Hertz) -> Result<StepGenerator, PrinterError> {
-    let specs =
-        step_distances(config).map(|step_distance| StepperSpec { step_distance, max_error: STEP_ERROR_MAX });
+/// A step generator for the machine's motors, whose steps may be off by so much.
+pub fn step_generator(
+    config: &PrinterConfig,
+    clock: Hertz,
+    max_error: Seconds,
+) -> Result<StepGenerator, PrinterError> {
+    let specs = step_distances(config).map(|step_distance| StepperSpec { step_distance, max_error });
     StepGenerator::new(clock, &specs, Cartesian)
         .map_err(|error| PrinterError::new(ErrorCode::ConfigInvalid, error.to_string()))
 }

@@ -78,6 +78,9 @@ pub(crate) struct PlanArgs {
     /// Plan with this minimum_cruise_ratio instead of the machine's
     #[arg(long, value_name = "RATIO", value_parser = ratio)]
     pub(crate) minimum_cruise_ratio: Option<f64>,
+    /// How early or late a step may come, in µs (and never more than a quarter of the gap to its neighbours); 25 is usual
+    #[arg(long, value_name = "US", value_parser = step_error)]
+    pub(crate) step_error_us: Option<f64>,
     /// Write the blocks that would be sent to a board into this file
     #[arg(long, value_name = "FILE")]
     pub(crate) dump_stream: Option<PathBuf>,
@@ -255,6 +258,10 @@ fn jerk(text: &str) -> Result<f64, String> {
 
 fn ratio(text: &str) -> Result<f64, String> {
     number(text, "a ratio from 0 to below 1", |value| (0.0..1.0).contains(&value))
+}
+
+fn step_error(text: &str) -> Result<f64, String> {
+    number(text, "a time from 0 to 1000 µs", |value| (0.0..=1000.0).contains(&value))
 }
 
 fn number(text: &str, what: &str, fits: impl Fn(f64) -> bool) -> Result<f64, String> {

@@ -15,7 +15,7 @@ use printer::{
     planner::{PlanOptions, PlanReport, PlanStream, Ramps},
 };
 use serde::Serialize;
-use units::MmPerS3;
+use units::{MmPerS3, Seconds};
 
 use crate::{
     cli::{PlanArgs, Profile},
@@ -80,6 +80,7 @@ pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
             Profile::Torque => Ramps::Torque,
             Profile::Jerk => Ramps::Jerk(args.max_jerk.map(MmPerS3)),
         }),
+        step_error: args.step_error_us.map(|error_us| Seconds(error_us * 1e-6)),
     };
     let mut stream = PlanStream::with_options(&config, options)?;
     let mut blocks = Vec::new();

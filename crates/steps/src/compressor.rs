@@ -252,7 +252,8 @@ impl Compressor {
 
     /// Closes one command with the steps taken so far, or with the first of them.
     fn emit(&mut self) {
-        let fit = self.stabbing.fit();
+        let last = self.times[self.stabbing.count() as usize - 1];
+        let fit = self.stabbing.fit(last - self.base_ticks);
         // Floats hold these integers exactly, and need no conversion to be compared.
         let mut clock = self.base_ticks;
         let mut interval = f64::from(fit.interval);

@@ -198,23 +198,13 @@ impl Piece {
         self.steps as f64 > rate * duration + 2.0
     }
 
-    /// Run clock of the next crossings, in ticks, `most` of them at most; moves on to the one after.
+    /// Run clock of the next crossing, in ticks; moves on to the one after.
     #[inline]
-    pub(crate) fn take(&mut self, most: u64, mut step: impl FnMut(f64)) {
-        let (start, duration) = (self.start, self.duration);
-        let steps = most.min(self.steps);
-        self.steps -= steps;
+    pub(crate) fn next_time(&mut self) -> f64 {
+        self.steps -= 1;
         match &mut self.curve {
-            Curve::Quadratic(quadratic) => {
-                for _ in 0..steps {
-                    step(start + quadratic.next(duration));
-                }
-            }
-            Curve::Higher(higher) => {
-                for _ in 0..steps {
-                    step(start + higher.next(duration) * duration);
-                }
-            }
+            Curve::Quadratic(quadratic) => self.start + quadratic.next(self.duration),
+            Curve::Higher(higher) => self.start + higher.next(self.duration) * self.duration,
         }
     }
 }
@@ -234,6 +224,7 @@ impl Quadratic {
 
 impl Higher {
     /// Share of the segment's time.
+    #[inline(never)]
     fn next(&mut self, duration: f64) -> f64 {
         let [c1, c2, c3, c4, c5] = self.powers;
         let slopes = [2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5];

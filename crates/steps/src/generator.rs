@@ -429,13 +429,11 @@ impl Motor {
             return self.generated > before || self.compressor.is_ready();
         };
         let forward = piece.forward;
-        let mut last = self.generated;
-        let compressor = &mut self.compressor;
-        piece.take(TURN_STEPS, |time| {
-            compressor.step(time, forward);
-            last = time;
-        });
-        self.generated = last;
+        for _ in 0..TURN_STEPS.min(piece.steps) {
+            let time = piece.next_time();
+            self.compressor.step(time, forward);
+            self.generated = time;
+        }
         if piece.steps == 0 {
             self.pieces.pop_front();
         }

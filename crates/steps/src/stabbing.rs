@@ -27,11 +27,19 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// The middle of the candidate's intervals.
-    fn new(candidate: Candidate, count: u32) -> Self {
-        let middle = floor(0.5 * (candidate.low + candidate.high));
-        let interval = middle.max(ceil(candidate.low)).max(1) as u32;
+    /// Of the candidate's intervals the one with which the last step comes nearest to `aim`, in ticks after the step before
+    /// the command: what follows starts there.
+    fn new(candidate: Candidate, count: u32, aim: f64) -> Self {
+        let n = f64::from(count);
+        let best = floor((aim - 0.5 * candidate.add * n * (n - 1.0)) / n + 0.5);
+        let interval = best.min(floor(candidate.high)).max(ceil(candidate.low)).max(1) as u32;
         Self { interval, add: if count == 1 { 0 } else { candidate.add as i16 }, count }
+    }
+
+    /// How far the last step is from `aim`.
+    fn off(&self, aim: f64) -> f64 {
+        let n = f64::from(self.count);
+        (n * f64::from(self.interval) + 0.5 * f64::from(self.add) * n * (n - 1.0) - aim).abs()
     }
 }
 
@@ -185,6 +193,18 @@ impl Stabbing {
     fn follow(&mut self, x: f64, low: f64, high: f64) -> bool {
         let half_x = 0.5 * x;
         let before = self.followed;
+        // The usual case in a long command.
+        if before == 1 {
+            let candidate = &mut self.candidates[0];
+            let rise = candidate.add * half_x;
+            let next_low = larger(candidate.low, low - rise);
+            let next_high = smaller(candidate.high, high - rise);
+            let passes = has_integer(next_low, next_high);
+            if passes {
+                (candidate.low, candidate.high) = (next_low, next_high);
+            }
+            return passes;
+        }
         let mut index = 0;
         while index < self.followed {
             let candidate = &mut self.candidates[index];
@@ -211,15 +231,22 @@ impl Stabbing {
     /// The best command for the windows taken: it covers all of them where integers allow, at least one otherwise.
     ///
     /// At least one window must have been taken.
-    pub(crate) fn fit(&self) -> Fit {
+    pub(crate) fn fit(&self, aim: f64) -> Fit {
         if self.followed > 0 {
-            let cost = |c: &&Candidate| (!ADD_SHORT.contains(&(c.add as i64)), c.add.abs() as i64);
-            let best = self.candidates[..self.followed].iter().min_by_key(cost);
-            return Fit::new(best.copied().unwrap_or_default(), self.count);
+            let fits = self.candidates[..self.followed]
+                .iter()
+                .map(|&candidate| Fit::new(candidate, self.count, aim));
+            // A short `add` first, then the end; a tie is not left to the order of the candidates, which trials change.
+            let best = fits.min_by(|a, b| {
+                let long = |fit: &Fit| !ADD_SHORT.contains(&i64::from(fit.add));
+                let ends = || a.off(aim).total_cmp(&b.off(aim));
+                long(a).cmp(&long(b)).then_with(ends).then(a.add.cmp(&b.add))
+            });
+            return best.unwrap_or(Fit { interval: 1, add: 0, count: 1 });
         }
         if self.count == 1 {
             let (low, high) = self.slits[0];
-            return Fit::new(Candidate { add: 0.0, low, high }, 1);
+            return Fit::new(Candidate { add: 0.0, low, high }, 1, aim);
         }
         let first = ceil(2.0 * self.flattest.slope);
         let last = floor(2.0 * self.steepest.slope);
@@ -233,14 +260,14 @@ impl Stabbing {
         for add in tries().filter(|add| (first..=last).contains(add)) {
             let candidate = self.candidate(add);
             if has_integer(candidate.low, candidate.high) {
-                return Fit::new(candidate, self.count);
+                return Fit::new(candidate, self.count, aim);
             }
         }
-        self.longest(tries())
+        self.longest(tries(), aim)
     }
 
     /// The candidate that passes the most windows from the first on.
-    fn longest(&self, adds: impl Iterator<Item = i64>) -> Fit {
+    fn longest(&self, adds: impl Iterator<Item = i64>, aim: f64) -> Fit {
         let mut best = (Candidate { add: 0.0, low: self.slits[0].0, high: self.slits[0].1 }, 1);
         for add in adds {
             let add = add as f64;
@@ -260,7 +287,7 @@ impl Stabbing {
                 best = (reached, count);
             }
         }
-        Fit::new(best.0, best.1)
+        Fit::new(best.0, best.1, aim)
     }
 }
 

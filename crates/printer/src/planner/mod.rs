@@ -113,7 +113,7 @@ impl Planner {
             machine_limits: limits,
             look_ahead,
             limits,
-            generator: machine::step_generator(config, clock)?,
+            generator: machine::step_generator(config, clock, machine::STEP_ERROR_MAX)?,
             position: [0.0; 4],
             clock,
             run: Run::None,

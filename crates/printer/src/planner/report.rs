@@ -59,6 +59,8 @@ pub struct PlanOptions {
     pub minimum_cruise_ratio: Option<f64>,
     /// How ramps are shaped, where not as the machine file says.
     pub ramps: Option<Ramps>,
+    /// How early or late a step may come, where not as usual ([`machine::STEP_ERROR_MAX`]); 1 ms at most.
+    pub step_error: Option<Seconds>,
 }
 
 /// How speed goes up and down along the path.
@@ -98,7 +100,7 @@ impl Ramps {
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        Self { feed_scale: 1.0, bound: false, minimum_cruise_ratio: None, ramps: None }
+        Self { feed_scale: 1.0, bound: false, minimum_cruise_ratio: None, ramps: None, step_error: None }
     }
 }
 
@@ -132,6 +134,9 @@ impl PlanStream {
         }
         let config = &config;
         let mut planner = Planner::new(config, PLAN_CLOCK)?;
+        if let Some(step_error) = options.step_error {
+            planner.generator = machine::step_generator(config, PLAN_CLOCK, step_error)?;
+        }
         if options.bound {
             planner.bound(config);
         }

@@ -182,6 +182,10 @@ impl Simulation {
         let machine = demo_machine::machine(&config)?;
         let step_distances = printer::machine::step_distances(&config).map(|distance| distance.0);
         let tally = Tally::new(step_distances, board.clock, config.shaper_reach());
+        let reach = config.shaper_reach().0;
+        // Where an input shaper has the head at most, off its path.
+        let limits = &config.printer;
+        let shaped_off = (limits.square_corner_velocity.0 + 0.5 * limits.max_accel.0 * reach) * reach;
         let host_hz = board.clock;
         let printer = VirtualPrinter::new(board, &machine, &faults, seed, tally)?;
         let start = printer.start();
@@ -224,7 +228,7 @@ impl Simulation {
             course: Course::default(),
             next_sample: start,
             seed,
-            path_error_max_mm: PATH_ERROR_MAX_MM.max((x * x + y * y + z * z).sqrt()),
+            path_error_max_mm: PATH_ERROR_MAX_MM.max((x * x + y * y + z * z).sqrt()) + shaped_off,
             wall_s: 0.0,
             after: After::default(),
             printer,
