@@ -13,5 +13,6 @@ mod machine;
 mod pause;
 mod power;
 mod print;
+mod rate;
 mod start;
 mod stopping;
