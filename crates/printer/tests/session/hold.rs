@@ -214,7 +214,7 @@ fn a_stall_where_nothing_is_leased_ends_as_it_would_without() {
     let mut bench = slow.ready();
     bench.start(&format!("G28\nG1 X20 F6000\n{END}"));
     bench.until("homing", 10.0, |bench| bench.pulses().len() > 100);
-    stall(&mut bench, 1.0);
+    stall(&mut bench, 2.5);
     bench.job_over();
     assert_eq!((bench.error().code, holds(&bench)), (ErrorCode::HomingTimeout, vec![]));
     // In a pause, and while it is heated.

@@ -8,6 +8,7 @@ mod console;
 mod faults;
 mod heaters;
 mod hold;
+mod homing;
 mod link;
 mod machine;
 mod pause;

@@ -232,7 +232,7 @@ impl Ready {
         }
         let Wait::Homing { axis, .. } = &mut self.wait else { return };
         let result = match message {
-            Message::Position { oid, position } => axis.on_position(oid, position),
+            Message::Position { oid, position } => axis.on_position(oid, position, now),
             Message::Endstop { oid, homing, pin_value } => {
                 axis.on_endstop(oid, homing, pin_value, now, &mut self.board)
             }
