@@ -7,6 +7,7 @@
 
 mod guard;
 mod item;
+mod paces;
 mod report;
 mod skip;
 mod source;
@@ -22,10 +23,13 @@ use units::{Hertz, MmPerS, Seconds, Ticks};
 
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
+use paces::Paces;
 pub use report::{MotorReport, PLAN_CLOCK, PlanReport, PlanStream};
 pub(crate) use skip::{Skip, Skipped};
 pub(crate) use source::Next;
 pub use source::{SOURCE_BYTES_MAX, Source};
+
+pub use crate::pace::Pace;
 
 use crate::{
     config::PrinterConfig,
@@ -84,6 +88,7 @@ pub struct Planner {
     run: Run,
     moves_pushed: u64,
     moves_planned: u64,
+    paces: Paces,
     /// Print time at which the last planned move ends.
     planned_until: Seconds,
     /// Print time at which the last dwell of this run ends.
@@ -113,6 +118,7 @@ impl Planner {
             run: Run::None,
             moves_pushed: 0,
             moves_planned: 0,
+            paces: Paces::default(),
             planned_until: Seconds::ZERO,
             dwelt_until: Seconds::ZERO,
             deferred: VecDeque::new(),
@@ -235,6 +241,7 @@ impl Planner {
         self.ready.clear();
         self.barrier = None;
         self.moves_planned = self.moves_pushed;
+        self.paces.clear();
         self.run = Run::None;
     }
 
@@ -245,7 +252,7 @@ impl Planner {
         feed: MmPerS,
         line: LineNumber,
     ) -> Result<(), PrinterError> {
-        self.push(to, feed, line)
+        self.push(to, feed, line, Pace::default())
     }
 
     /// The next item of the plan.
@@ -401,7 +408,7 @@ impl Planner {
         let from = gcode::Position { x, y, z, e: e - e_offset };
         self.guard.judge(&Move { from, ..*mv })?;
         let feed = self.feed(mv, to, source);
-        self.push(to, feed, mv.line)
+        self.push(to, feed, mv.line, source.pace())
     }
 
     /// A move's feed; one that a factor has made faster than the motors can follow is slowed down to what they can.
@@ -416,7 +423,7 @@ impl Planner {
         feed
     }
 
-    fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
+    fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber, pace: Pace) -> Result<(), PrinterError> {
         if to == self.position {
             return Ok(());
         }
@@ -433,7 +440,11 @@ impl Planner {
         let request = MoveRequest { from: self.position, to, feed, tag: line.0 };
         self.look_ahead.push(&request).map_err(|error| wrong(&error).at_line(line.0))?;
         // The look-ahead drops moves without length.
-        self.moves_pushed += (self.look_ahead.len() - before) as u64;
+        let pushed = (self.look_ahead.len() - before) as u64;
+        if pushed > 0 {
+            self.paces.push(self.moves_pushed, pace);
+        }
+        self.moves_pushed += pushed;
         self.position = to;
         Ok(())
     }
@@ -452,8 +463,9 @@ impl Planner {
             return Err(PrinterError::new(code, error.to_string()).at_line(planned.tag));
         }
         self.planned_until = Seconds(planned.end_time());
+        let pace = self.paces.take(self.moves_planned);
         self.moves_planned += 1;
-        self.ready.push_back(Planned::Move(planned));
+        self.ready.push_back(Planned::Move(planned, pace));
         while let Some(deferred) = self.deferred.pop_front_if(|deferred| deferred.after <= self.moves_planned)
         {
             let Deferred { line, action, not_before, .. } = deferred;

@@ -69,7 +69,7 @@ impl Board {
         self.motion.at(self.clock_at(now))
     }
 
-    /// The hardware clock of a motion clock, should motion go on at its full rate.
+    /// The hardware clock of a motion clock at the earliest: should motion go on at its full rate.
     pub(super) fn hardware_of(&self, motion: Ticks, now: Seconds) -> Ticks {
         self.motion.hardware(motion, self.clock_at(now))
     }
@@ -77,7 +77,7 @@ impl Board {
     /// Both clocks now.
     pub(super) fn clocks(&self, now: Seconds) -> Clocks {
         let hardware = self.clock_at(now);
-        Clocks { hardware, motion: self.motion.at(hardware), is_steady: self.motion.is_steady() }
+        Clocks { hardware, motion: self.motion.at(hardware), rate: self.motion.even_rate() }
     }
 
     /// Takes the board's word on its motion clock; its hardware clock then, if that can be.
@@ -88,6 +88,12 @@ impl Board {
             slack: self.ticks(REPORT_SLACK),
         };
         self.motion.report(report, heard)
+    }
+
+    /// Has motion go at this rate, by a ramp of so many ticks.
+    pub(super) fn set_rate(&mut self, rate: u16, ramp: Ticks, now: Seconds) {
+        self.motion.tell(rate, self.clock_at(now));
+        self.control(&Command::MotionRate { rate, ramp: ramp.0 as u32 });
     }
 
     /// A duration in ticks of the nominal clock: what every plan is made in.

@@ -14,5 +14,6 @@ mod machine;
 mod pause;
 mod power;
 mod print;
+mod rate;
 mod start;
 mod stopping;

@@ -9,6 +9,7 @@ mod ending;
 mod hold;
 mod pause;
 mod plan;
+mod rate;
 mod start;
 mod take_up;
 mod take_up_parked;
@@ -20,6 +21,7 @@ use units::Seconds;
 use self::{
     calls::Calls,
     hold::Hold,
+    rate::Rate,
     waiting::{Held, Wait},
 };
 use super::{
@@ -84,6 +86,7 @@ pub(super) struct Ready {
     /// When the last run of motion came to its end, by this host's clock.
     rested: Seconds,
     lease: Lease,
+    rate: Rate,
     /// Motion is held.
     hold: Option<Hold>,
     /// The board has lowered its heaters, which has not been dealt with.
@@ -119,6 +122,7 @@ impl Ready {
             last_active: now,
             rested: Seconds(f64::NEG_INFINITY),
             lease,
+            rate: Rate::new(),
             hold: None,
             have_heaters_fallen: false,
             calls: Calls::default(),
@@ -135,7 +139,7 @@ impl Ready {
     pub(super) fn motion_queued(&self, now: Seconds) -> Option<Seconds> {
         let motion_now = self.board.motion_at(now);
         let run = self.stream.run()?;
-        if run.homing || run.end.is_some() || motion_now < run.start || !self.board.motion.is_steady() {
+        if run.homing || run.end.is_some() || motion_now < run.start || !self.board.motion.is_running() {
             return None;
         }
         let covered = self.stream.covered(self.planner.generated_until(), &self.board)?;
@@ -303,13 +307,14 @@ impl Ready {
         self.diary.tell_progress(now);
         self.pump(now)?;
         self.renew_lease(now);
+        self.keep_rate(now);
         self.rest(now);
         Ok(())
     }
 
     fn on_due(&mut self, due: Due, now: Seconds) {
         match due {
-            Due::MoveEnd(made) => {
+            Due::MoveEnd(made, _) => {
                 let elapsed = self.stream.elapsed(made.end, &self.board);
                 if made.line > 0 && self.plans_job() {
                     self.diary.progress(Progress { line: made.line, elapsed, z: made.to[2] });

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use units::{Celsius, Seconds, Ticks};
 use wire::Command;
 
-use super::Ready;
+use super::{Ready, rate::Rate};
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
@@ -76,7 +76,7 @@ impl Ready {
         let mut ready = Self::with_planner(config, board, taken.planner, now);
         let counts = queue.motors.map(|motor| motor.position);
         let made = |motor: usize| if inverted[motor] { -taken.made[motor] } else { taken.made[motor] };
-        ready.diary = diary;
+        (ready.diary, ready.rate) = (diary, Rate::unknown());
         let run = ready.stream.take_up(&TakenUp {
             start,
             end: taken.end.map(|end| start + end),
@@ -89,7 +89,7 @@ impl Ready {
         for (at, due) in taken.timeline {
             let at = start + at;
             match due {
-                TimedDue::Move(planned) if at > motion_now => ready.schedule_move(&planned, run),
+                TimedDue::Move(planned, pace) if at > motion_now => ready.schedule_move(&planned, pace, run),
                 TimedDue::Action(_, TimedAction::Fan { speed, .. }) if at > motion_now => {
                     rest.fans.push((at, speed));
                 }
@@ -97,7 +97,7 @@ impl Ready {
                     ready.stream.schedule(at, Due::Action(line, action));
                 }
                 TimedDue::Action(_, action) => rest.pass(&action),
-                TimedDue::Move(_) => {}
+                TimedDue::Move(..) => {}
             }
         }
         taken.adopted.iter().for_each(|&input| rest.adopt(input));

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use units::{Clock32, Seconds, Ticks};
 
-use super::{Ready, hold::Purpose, take_up::Rest};
+use super::{Ready, hold::Purpose, rate::Rate, take_up::Rest};
 use crate::{
     config::PrinterConfig,
     error::PrinterError,
@@ -51,7 +51,7 @@ impl Ready {
         let mut diary = Diary::default();
         diary.take_up(&taken, now);
         let mut ready = Self::with_planner(config, board, planner, now);
-        ready.diary = diary;
+        (ready.diary, ready.rate) = (diary, Rate::unknown());
         ready.planner.stand_at(here);
         let homed = taken.planner.guard.homed();
         (0..3).for_each(|axis| ready.planner.guard.set_homed(axis, homed[axis]));
@@ -70,8 +70,8 @@ impl Ready {
         };
         for (at, due) in taken.timeline {
             match due {
-                TimedDue::Move(planned) if at > cut.at => {
-                    cut.timeline.push_back((at, Due::MoveEnd(ready.scheduled(&planned, run))));
+                TimedDue::Move(planned, pace) if at > cut.at => {
+                    cut.timeline.push_back((at, Due::MoveEnd(ready.scheduled(&planned, run), pace)));
                 }
                 TimedDue::Action(_, TimedAction::Fan { speed, .. }) if at > cut.at => {
                     cut.left.fans.push_back((at, speed));
@@ -80,7 +80,7 @@ impl Ready {
                     cut.timeline.push_back((at, Due::Action(line, action)));
                 }
                 TimedDue::Action(_, action) => rest.pass(&action),
-                TimedDue::Move(_) => {}
+                TimedDue::Move(..) => {}
             }
         }
         taken.adopted.iter().for_each(|&input| rest.adopt(input));
