@@ -159,6 +159,15 @@ impl Ready {
         true
     }
 
+    /// This host was held up for so long: what it has asked had no time to be answered.
+    pub(super) fn has_not_listened(&mut self, gap: Seconds) {
+        if let Some(Phase::Rejoining { since, .. } | Phase::Dropping { since, .. }) =
+            self.hold.as_mut().map(|hold| &mut hold.phase)
+        {
+            *since += gap;
+        }
+    }
+
     /// A motor's answer to a dropped queue.
     pub(super) fn on_queue(&mut self, oid: u8, queue: &MotorQueue) {
         let is_it = |oids: &Option<StepperOids>| oids.is_some_and(|oids| oids.stepper.0 == oid);

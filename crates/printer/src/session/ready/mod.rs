@@ -19,7 +19,7 @@ use gcode::LineNumber;
 use units::Seconds;
 
 use self::{
-    calls::Calls,
+    calls::{Calls, GAP_LONG},
     hold::Hold,
     rate::Rate,
     waiting::{Held, Wait},
@@ -165,7 +165,9 @@ impl Ready {
 
     /// What came during a long pause has waited: it tells nothing of now.
     fn note_call(&mut self, now: Seconds) {
-        if self.calls.note(now) {
+        let Some(gap) = self.calls.note(now) else { return };
+        self.has_not_listened(gap);
+        if gap >= GAP_LONG {
             self.thermal.listens_again(now);
         }
     }
