@@ -125,6 +125,6 @@ fn the_least_motion_queued_tells_of_a_host_that_was_held_up() {
         let least = host.snapshot(printer.now()).job.queued_least_s.unwrap();
         // Held up for longer, it would find its motion held. Ten seconds are kept, and looked after twenty times a second.
         let expected = 9.9 - held_up_s;
-        assert!((least - expected).abs() < 0.3, "held up for {held_up_s} s: {least} s were left");
+        assert!((least - expected).abs() < 0.5, "held up for {held_up_s} s: {least} s were left");
     }
 }
