@@ -27,7 +27,7 @@ const RUN_LEAD_LOSSY: Seconds = Seconds(1.2);
 /// How much motion is planned and sent ahead of the board's clock, where it can be held at any place …
 const HORIZON: Seconds = Seconds(10.0);
 /// … and this much less than half of the clock's range, which is little on fast boards …
-const HORIZON_SPARE: Seconds = Seconds(1.0);
+const HORIZON_SPARE: Seconds = Seconds(0.25);
 /// … and where a pause runs it empty.
 const HORIZON_PLAIN: Seconds = Seconds(4.0);
 
