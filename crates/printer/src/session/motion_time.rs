@@ -90,6 +90,8 @@ pub(super) struct MotionTime {
     is_hold: bool,
     /// The rate that the board was last told.
     told: u16,
+    /// It was told to come to rest, and not to go on.
+    rests: bool,
     /// The clock of its last word.
     heard: Ticks,
     /// Since this hardware clock nothing is claimed beyond what is known: the board may have done anything.
@@ -116,6 +118,7 @@ impl Default for MotionTime {
             state: MotionState::Running,
             is_hold: false,
             told: RATE_ONE,
+            rests: false,
             heard: Ticks(0),
             in_doubt: None,
         }
@@ -126,7 +129,7 @@ impl MotionTime {
     /// The motion clock at a hardware clock; never beyond what it can be. While it comes to rest, no more is claimed than
     /// was told: what it was told to run at, it runs at no longer.
     pub(super) fn at(&self, clock: Ticks) -> Ticks {
-        if self.in_doubt.is_some() {
+        if self.in_doubt.is_some() || self.rests {
             return self.motion;
         }
         let since = clock.0 as i64 - self.clock.0 as i64;
@@ -158,11 +161,22 @@ impl MotionTime {
 
     /// The board is told another rate.
     pub(super) fn tell(&mut self, rate: u16, clock_now: Ticks) {
+        self.rebase(clock_now);
+        self.told = rate;
+    }
+
+    /// The board is told to come to rest, or to go on.
+    pub(super) fn tell_rest(&mut self, rests: bool, clock_now: Ticks) {
+        self.rebase(clock_now);
+        self.rests = rests;
+    }
+
+    /// What is claimed by now stays so.
+    fn rebase(&mut self, clock_now: Ticks) {
         if self.is_running() {
             self.motion = self.at(clock_now);
             self.clock = clock_now;
         }
-        self.told = rate;
     }
 
     /// Whether motion goes at the rate that the board was last told.
@@ -182,7 +196,7 @@ impl MotionTime {
 
     /// Whether motion goes at an even rate.
     pub(super) const fn is_running(&self) -> bool {
-        self.in_doubt.is_none() && matches!(self.state, MotionState::Running)
+        self.in_doubt.is_none() && !self.rests && matches!(self.state, MotionState::Running)
     }
 
     /// Whether the two clocks are a fixed lag apart, and stay so.
@@ -327,6 +341,22 @@ mod tests {
         let report = MotionReport::new(16_000, 9000, RATE_ONE, 0, 0);
         assert!(time.report(&report, heard(16_000)).is_some() && time.is_steady());
         assert_eq!(time.at(Ticks(16_100)), Ticks(9100));
+    }
+
+    #[test]
+    fn what_is_told_to_rest_makes_nothing_more_until_the_board_says_so() {
+        let mut time = MotionTime::default();
+        time.trust(Ticks(1000));
+        time.tell_rest(true, Ticks(3000));
+        assert_eq!((time.at(Ticks(9000)), time.is_running()), (Ticks(3000), false));
+        assert_eq!(time.latest(Ticks(9000)), Ticks(9000));
+        assert!(time.report(&MotionReport::new(3500, 3500, RATE_ONE, 0, 0), heard(3600)).is_some());
+        assert_eq!(time.at(Ticks(9000)), Ticks(3500));
+        assert!(time.report(&MotionReport::new(5000, 4200, 0, 2, 1), heard(5000)).is_some());
+        time.tell_rest(false, Ticks(6000));
+        assert_eq!((time.at(Ticks(9000)), time.is_held()), (Ticks(4200), true));
+        assert!(time.report(&MotionReport::new(8000, 5000, RATE_ONE, 0, 0), heard(8000)).is_some());
+        assert_eq!((time.at(Ticks(9000)), time.is_steady()), (Ticks(6000), true));
     }
 
     #[test]

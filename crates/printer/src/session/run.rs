@@ -23,6 +23,17 @@ pub(super) enum Due {
     Action(LineNumber, TimedAction),
 }
 
+/// Whether the nozzle is on once all this has happened.
+pub(super) fn leaves_hot(timeline: &VecDeque<(Ticks, Due)>, is_hot: bool) -> bool {
+    timeline.iter().fold(is_hot, |is_hot, (_, due)| match due {
+        Due::Action(_, TimedAction::SetTemperature { heater: gcode::Heater::Tool(0), target }) => {
+            target.0 > 0.0
+        }
+        Due::Action(_, TimedAction::TurnOffHeaters) => false,
+        _ => is_hot,
+    })
+}
+
 /// A run of motion on the board's clock.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Run {

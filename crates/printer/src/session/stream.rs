@@ -10,7 +10,7 @@ use steps::{StepCommand, StepCommandKind};
 use units::{Seconds, Ticks};
 use wire::Command;
 
-pub(super) use super::run::{Cut, Due, Run, TakenUp};
+pub(super) use super::run::{Cut, Due, Run, TakenUp, leaves_hot};
 use super::{
     board::{Board, FAN_LANE},
     event::ScheduledMove,
@@ -25,8 +25,6 @@ use crate::{
     planner::Position,
 };
 
-/// How much motion is planned and sent ahead of the board's clock.
-pub(super) const HORIZON: Seconds = Seconds(4.0);
 /// With less than this ahead and no more G-code at hand, the machine is brought to rest on what there is.
 pub(super) const STARVED: Seconds = Seconds(1.0);
 /// A motor's lane that has less room than this takes no more: one command of the planner's is at most three messages.
@@ -102,7 +100,7 @@ impl MotionStream {
             && self
                 .run
                 .zip(generated_until)
-                .is_none_or(|(run, until)| run.start + until < clock_now + board.ticks(HORIZON))
+                .is_none_or(|(run, until)| run.start + until < clock_now + board.horizon())
     }
 
     /// Whether the motion planned so far ends soon.
@@ -378,6 +376,11 @@ impl MotionStream {
             Due::MoveEnd(_, pace) => Some(*pace),
             Due::Action(..) => None,
         })
+    }
+
+    /// Whether the nozzle is on once all that has been planned has been made.
+    pub(super) fn leaves_hot(&self, is_hot: bool) -> bool {
+        leaves_hot(&self.timeline, is_hot)
     }
 
     /// The run's last move has been planned; it ends at this clock.

@@ -345,7 +345,7 @@ impl Ready {
                     }
                     if now - hold.asked >= ASK_AGAIN {
                         hold.asked = now;
-                        self.tell_hold(hold.purpose);
+                        self.tell_hold(hold.purpose, now);
                     }
                 }
             }
@@ -393,8 +393,8 @@ impl Ready {
                 if let Some(cover) = self.cover_to_resume(now) {
                     self.lease.tell(cover, &mut self.board, now);
                     self.keep_rate(now);
-                    let ramp = self.board.ticks(self.lease.ramp()).0 as u32;
-                    self.board.control(&Command::MotionResume { ramp });
+                    let ramp = self.board.ticks(self.lease.ramp());
+                    self.board.resume_motion(ramp, now);
                     *told = Some(self.board.clock_at(now));
                 }
             }
@@ -428,7 +428,7 @@ impl Ready {
                 if now - *asked >= ASK_AGAIN {
                     *asked = now;
                     self.keep_rate(now);
-                    self.board.control(&Command::MotionResume { ramp: 0 });
+                    self.board.resume_motion(Ticks(0), now);
                 }
             }
         }

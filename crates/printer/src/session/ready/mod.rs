@@ -19,7 +19,7 @@ use gcode::LineNumber;
 use units::Seconds;
 
 use self::{
-    calls::Calls,
+    calls::{Calls, GAP_LONG},
     hold::Hold,
     rate::Rate,
     waiting::{Held, Wait},
@@ -49,6 +49,8 @@ use crate::{
 const PUMP_INTERVAL: Seconds = Seconds(0.05);
 /// While lines are passed over, the owner is asked for more of the file this often.
 const SKIP_INTERVAL: Seconds = Seconds(0.002);
+/// So far ahead the board has the fan's changes: more than what it moves on its own once it is left alone.
+const FAN_AHEAD: Seconds = Seconds(3.0);
 /// How often a machine at rest looks after itself.
 const IDLE_INTERVAL: Seconds = Seconds(0.25);
 /// Motion that is due this long ago and has not been sent is none that the board could make.
@@ -163,7 +165,9 @@ impl Ready {
 
     /// What came during a long pause has waited: it tells nothing of now.
     fn note_call(&mut self, now: Seconds) {
-        if self.calls.note(now) {
+        let Some(gap) = self.calls.note(now) else { return };
+        self.has_not_listened(gap);
+        if gap >= GAP_LONG {
             self.thermal.listens_again(now);
         }
     }
@@ -288,10 +292,11 @@ impl Ready {
             return self.advance_hold(now);
         }
         let motion_now = self.board.motion_at(now);
-        self.stream.forget_made(motion_now, &self.board);
         if !self.plans_nothing() {
+            self.give_fan_orders(now);
             self.stream.send_again(&mut self.board, now);
         }
+        self.stream.forget_made(motion_now, &self.board);
         while let Some(due) = self.stream.pop_due(motion_now) {
             self.on_due(due, now);
         }
@@ -310,6 +315,14 @@ impl Ready {
         self.keep_rate(now);
         self.rest(now);
         Ok(())
+    }
+
+    /// The board gets changes of the fan's speed as late as is safe: what the user sets comes behind those that it has.
+    fn give_fan_orders(&mut self, now: Seconds) {
+        let until = self.board.motion_at(now) + self.board.ticks(FAN_AHEAD);
+        while let Some((at, speed)) = self.stream.kept.next_fan(until) {
+            self.thermal.set_fan(speed, Some(at), &mut self.board, now);
+        }
     }
 
     fn on_due(&mut self, due: Due, now: Seconds) {

@@ -210,13 +210,12 @@ impl Ready {
         }
         let clock = run.start + self.board.ticks(at);
         match action {
-            // The board itself does it at that clock.
+            // The board itself does it at that clock, once it is near.
             TimedAction::Fan { speed, .. } => {
                 self.stream.kept.push_fan(clock, speed);
                 if !self.plans_job() {
                     self.diary.input(Input::Fan(speed));
                 }
-                self.thermal.set_fan(speed, Some(clock), &mut self.board, now);
             }
             action => self.stream.schedule(clock, Due::Action(line, action)),
         }

@@ -6,7 +6,6 @@
 use std::collections::VecDeque;
 
 use units::{Celsius, Seconds, Ticks};
-use wire::Command;
 
 use super::{Ready, rate::Rate};
 use crate::{
@@ -104,7 +103,7 @@ impl Ready {
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
         job.source = taken.source;
         job.has_moved = true;
-        job.leaves_hot = rest.is_nozzle_on();
+        job.leaves_hot = ready.stream.leaves_hot(rest.is_nozzle_on());
         job.told = now;
         ready.job = Some(job);
         ready.hold_for_host(rest);
@@ -120,7 +119,6 @@ impl Ready {
         self.thermal.set_fan(rest.fan, None, &mut self.board, now);
         for &(at, speed) in &rest.fans {
             self.stream.kept.push_fan(at, speed);
-            self.thermal.set_fan(speed, Some(at), &mut self.board, now);
         }
     }
 }
@@ -180,8 +178,8 @@ impl Rest {
     pub(super) fn stop(&mut self, ramp: Seconds, board: &mut Board, now: Seconds) {
         if now - self.asked >= ASK_AGAIN && !board.motion.is_held() {
             self.asked = now;
-            let ramp = board.ticks(ramp).0 as u32;
-            board.control(&Command::MotionHold { ramp });
+            let ramp = board.ticks(ramp);
+            board.hold_motion(ramp, now);
         }
     }
 }

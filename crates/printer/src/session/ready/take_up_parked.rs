@@ -17,7 +17,7 @@ use crate::{
         diary::Diary,
         job::{Job, JobOptions, JobState, Paused, Retracted},
         kept::Left,
-        stream::{Cut, Due, Run},
+        stream::{Cut, Due, Run, leaves_hot},
     },
 };
 
@@ -85,11 +85,12 @@ impl Ready {
         }
         taken.adopted.iter().for_each(|&input| rest.adopt(input));
         cut.left.fan = rest.fan();
+        let leaves_hot = leaves_hot(&cut.timeline, rest.is_nozzle_on());
         let could_extrude = rest.is_nozzle_on() || parked.retract > 0.0;
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
         job.source = taken.source;
         job.has_moved = true;
-        job.leaves_hot = rest.is_nozzle_on();
+        job.leaves_hot = leaves_hot;
         job.told = now;
         job.state = JobState::Halting;
         job.paused = Some(Paused {
