@@ -15,6 +15,8 @@ const SERIOUS = new Set(['serious', 'critical']);
 
 // A trace would keep a copy of the whole page for each of axe's questions.
 test.use({ trace: 'off' });
+// Axe works in the page, in tasks of 100 ms and more: other specs judge the page's own.
+test.use({ areTasksJudged: false });
 
 /** Transitions would be measured half-way. */
 const still = (page: Page): Promise<void> => page.emulateMedia({ reducedMotion: 'reduce' });

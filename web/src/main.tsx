@@ -1,4 +1,5 @@
-// The page's start: the shell first, then the workers, which load the planner.
+// The page's start: the shell first, then the workers, which load the planner, then the rest of the page; in pieces, so
+// that no task keeps the page from answering.
 import { render } from 'preact';
 import './styles/base.css';
 import './styles/controls.css';
@@ -6,7 +7,7 @@ import './styles/layout.css';
 import './styles/job.css';
 import './styles/panels.css';
 import './styles/instruments.css';
-import { App } from './panel/app';
+import { App, PARTS, shownUpTo } from './panel/app';
 import { openDialog } from './panel/dialogs';
 import { guardPrint } from './panel/guard';
 import { followHeld } from './panel/held_dialog';
@@ -24,22 +25,32 @@ import { applySettings } from './state/settings';
 import { followStart } from './state/start';
 import { followStartRequest } from './state/start_request';
 import { startWatching } from './state/watched';
+import { inTasks } from './tasks';
 
 applySettings();
 const root = document.getElementById('app');
-if (root) render(<App />, root);
-startMachine();
-startPreview();
-startWatching();
-followTemperatures();
-guardPrint();
-followPort();
-followPrint();
-followStart();
-followStartRequest();
-followForNotifications();
-advisePinning();
-followHeld();
-followInterrupted((print) => void useMachineOf(print).then(() => (openDialog.value = 'connect')));
-startOffline();
-void loadProfiles().then(followProfile);
+inTasks(
+  () => {
+    if (root) render(<App />, root);
+  },
+  () => {
+    startMachine();
+    startPreview();
+    startWatching();
+    followTemperatures();
+    guardPrint();
+    followPort();
+    followPrint();
+    followStart();
+    followStartRequest();
+    followForNotifications();
+    advisePinning();
+    followHeld();
+    followInterrupted((print) => void useMachineOf(print).then(() => (openDialog.value = 'connect')));
+    startOffline();
+    void loadProfiles().then(followProfile);
+  },
+  ...PARTS.map((part) => () => {
+    shownUpTo.value = part;
+  }),
+);

@@ -14,6 +14,7 @@ pub mod journal;
 pub mod link;
 pub mod machine;
 pub mod move_queue;
+mod pace;
 pub mod planner;
 pub mod preview;
 pub mod session;

@@ -132,11 +132,11 @@ mod tests {
         let mut queue = MoveQueue::new(64, Ticks(10));
         queue.take_motion(0, Ticks(100));
         queue.take_other(Ticks(100));
-        let held = Clocks { hardware: Ticks(105), motion: Ticks(40), is_steady: false };
+        let held = Clocks { hardware: Ticks(105), motion: Ticks(40), rate: None };
         assert_eq!(queue.next_release(held), Some(Ticks(5)));
         queue.release(Clocks { hardware: Ticks(200), ..held });
         assert_eq!((queue.taken(), queue.next_release(held)), (1, None));
-        let runs = Clocks { hardware: Ticks(200), motion: Ticks(50), is_steady: true };
+        let runs = Clocks { hardware: Ticks(200), motion: Ticks(50), ..Clocks::from(Ticks(200)) };
         assert_eq!(queue.next_release(runs), Some(Ticks(60)));
     }
 

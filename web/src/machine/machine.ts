@@ -26,7 +26,7 @@ const MISSED_MIN = seconds(1);
 /** Of the planned speed, this much is told: what was … */
 const SPEED_BEHIND = seconds(20);
 /** … and what comes: a little more than the session plans ahead. */
-const SPEED_AHEAD = seconds(5);
+const SPEED_AHEAD = seconds(11);
 
 /** While a plan is made again: so many pieces of it in one go … */
 const PIECES_MAX = 16;

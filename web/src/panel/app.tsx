@@ -1,5 +1,5 @@
 // The page as a whole. The shell (connecting, emergency stop, settings) is there at once; what needs the planner says so.
-import { useSignal } from '@preact/signals';
+import { signal, useSignal } from '@preact/signals';
 import type { JSX } from 'preact';
 import { useEffect } from 'preact/hooks';
 import { isPrinting } from '../state/machine';
@@ -54,8 +54,15 @@ function useDrop(): boolean {
   return over.value;
 }
 
+/** The page's parts below its head in the order in which they come when it starts. */
+export const PARTS = ['viewer', 'job', 'machine', 'rest'] as const;
+/** The last of them that is there. */
+export const shownUpTo = signal<(typeof PARTS)[number] | null>(null);
+
 export function App(): JSX.Element {
   const isOver = useDrop();
+  const last = shownUpTo.value === null ? -1 : PARTS.indexOf(shownUpTo.value);
+  const isThere = (part: (typeof PARTS)[number]): boolean => PARTS.indexOf(part) <= last;
   return (
     <>
       <div class="page-head">
@@ -65,20 +72,24 @@ export function App(): JSX.Element {
       </div>
       <main class="layout">
         <div class="stage">
-          <Viewer />
-          <Job />
+          {isThere('viewer') && <Viewer />}
+          {isThere('job') && <Job />}
         </div>
         <div class="side">
           <WatchedMachines />
-          {!isViewing.value && (
+          {isThere('machine') && !isViewing.value && (
             <>
               <Temperatures />
               <Motion />
               <Tuning />
             </>
           )}
-          <Instruments />
-          <Console />
+          {isThere('rest') && (
+            <>
+              <Instruments />
+              <Console />
+            </>
+          )}
         </div>
       </main>
       {isOver && (

@@ -1,6 +1,7 @@
 // The console: what happened, and a line to type G-code into, with a history.
 import type { JSX } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
+import { dateFormat } from '../dates';
 import { entries } from '../state/log';
 import { gcode, mayMove } from '../state/machine';
 import { Button, Card } from './parts';
@@ -9,7 +10,7 @@ import { notFree } from './reasons';
 const HISTORY_MAX = 50;
 const history: string[] = [];
 
-const time = new Intl.DateTimeFormat(undefined, {
+const time = dateFormat({
   hour: '2-digit',
   minute: '2-digit',
   second: '2-digit',
@@ -45,7 +46,7 @@ function Log(): JSX.Element {
       {entries.value.length === 0 && <li class="dim">What happens is noted here.</li>}
       {entries.value.map((entry) => (
         <li key={entry.id} class={entry.kind}>
-          <time dateTime={entry.at.toISOString()}>{time.format(entry.at)}</time>
+          <time dateTime={entry.at.toISOString()}>{time(entry.at)}</time>
           <span>{entry.text}</span>
         </li>
       ))}

@@ -1,6 +1,7 @@
 // The file as a print: what it takes, what stands against it, and starting, pausing, ending it.
 import { effect, signal } from '@preact/signals';
 import type { JSX } from 'preact';
+import { dateFormat } from '../dates';
 import type { Summary } from '../preview/protocol';
 import { connection, isPrinting, job, outcome, snapshot, wish } from '../state/machine';
 import { closeFile, file, type OpenFile, openFile, summary } from '../state/preview';
@@ -51,8 +52,8 @@ function Plan({ plan }: { readonly plan: Summary }): JSX.Element {
   );
 }
 
-const clock = new Intl.DateTimeFormat(undefined, { hour: 'numeric', minute: '2-digit' });
-const clockWithDay = new Intl.DateTimeFormat(undefined, {
+const clock = dateFormat({ hour: 'numeric', minute: '2-digit' });
+const clockWithDay = dateFormat({
   weekday: 'short',
   hour: 'numeric',
   minute: '2-digit',
@@ -61,7 +62,7 @@ const clockWithDay = new Intl.DateTimeFormat(undefined, {
 /** The time of day, in so many seconds; with the day where that is another. */
 function timeIn(left: number): string {
   const [now, then] = [new Date(), new Date(Date.now() + left * 1000)];
-  return (now.getDate() === then.getDate() && left < 86_400 ? clock : clockWithDay).format(then);
+  return (now.getDate() === then.getDate() && left < 86_400 ? clock : clockWithDay)(then);
 }
 
 /** How far the print is. */

@@ -1,6 +1,7 @@
 // Stalls of what drives the printer: the computer slept, or was very busy. Kept for the diagnostic report, told quietly.
 // Bounded: the last ones are kept, all are counted. Times in s.
 import { signal } from '@preact/signals';
+import { dateFormat } from '../dates';
 import type { Seconds } from '../units';
 import { note } from './log';
 import { notify } from './notices';
@@ -22,7 +23,7 @@ export interface Incidents {
 
 export const incidents = signal<Incidents>({ count: 0, longest: 0, kept: [] });
 
-const clock = new Intl.DateTimeFormat(undefined, {
+const clock = dateFormat({
   hour: '2-digit',
   minute: '2-digit',
   second: '2-digit',
@@ -44,6 +45,6 @@ export function stalled(seconds: Seconds, isPrinting: boolean): void {
   const others = now.count > 1 ? ` So far ${now.count} times, at most ${now.longest.toFixed(1)} s.` : '';
   notify({
     kind: 'stall',
-    text: `${what} at ${clock.format(incident.at)}: the computer slept or was very busy.${others}`,
+    text: `${what} at ${clock(incident.at)}: the computer slept or was very busy.${others}`,
   });
 }

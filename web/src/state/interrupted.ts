@@ -1,6 +1,7 @@
 // What the page does about prints that outlived their page: says so, offers to connect with the right machine, and shows
 // the file of one that was taken up. Nothing of it connects or moves by itself.
 import { computed, effect } from '@preact/signals';
+import { dateFormat } from '../dates';
 import type { KeptPrint } from '../machine/protocol';
 import type { Summary } from '../preview/protocol';
 import { heldPrint, keptPrints } from './kept';
@@ -18,14 +19,14 @@ import { watched } from './watched';
 const SHOWN_MAX = 3;
 const KIND = 'interrupted:';
 
-const when = new Intl.DateTimeFormat(undefined, {
+const when = dateFormat({
   weekday: 'short',
   day: 'numeric',
   month: 'short',
   hour: 'numeric',
   minute: '2-digit',
 });
-export const timeOf = (ms: number): string => when.format(new Date(ms));
+export const timeOf = (ms: number): string => when(new Date(ms));
 
 const lineOf = ({ line }: KeptPrint): string => (line > 0 ? `, after line ${line}` : '');
 

@@ -164,7 +164,9 @@ export function followPrint(): void {
   followLine();
   effect(() => {
     const now = snapshot.value;
-    if (now?.job === 'printing' && now.elapsed === 0) filamentBefore.value = now.position?.[3] ?? 0;
+    // One that begins in the middle of its file is paused at first.
+    const begins = now?.job === 'printing' || (now?.job === 'paused' && Boolean(printed.value?.from));
+    if (begins && now.elapsed === 0) filamentBefore.value = now.position?.[3] ?? 0;
   });
   effect(() => {
     const state = isPrinting.value ? (snapshot.value?.job ?? '') : (outcome.value ?? '');

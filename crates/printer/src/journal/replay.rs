@@ -22,7 +22,9 @@ use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
     machine::{self, MOTORS},
-    planner::{Barrier, ExtrusionPermit, Planned, Planner, Position, Skip, Skipped, Source, TimedAction},
+    planner::{
+        Barrier, ExtrusionPermit, Pace, Planned, Planner, Position, Skip, Skipped, Source, TimedAction,
+    },
 };
 
 /// Items of the plan that are made in one go.
@@ -35,7 +37,7 @@ const TIMELINE_MAX: usize = 65_536;
 /// Something that comes at a time of the run.
 #[derive(Clone, Debug)]
 pub(crate) enum TimedDue {
-    Move(PlannedMove),
+    Move(PlannedMove, Pace),
     Action(LineNumber, TimedAction),
 }
 
@@ -324,8 +326,8 @@ impl Replay {
                     self.is_done = self.queue.is_held && self.has_all();
                 }
             }
-            Planned::Move(planned) if self.is_reached() => {
-                self.later(Seconds(planned.end_time()), TimedDue::Move(planned))?;
+            Planned::Move(planned, pace) if self.is_reached() => {
+                self.later(Seconds(planned.end_time()), TimedDue::Move(planned, pace))?;
             }
             Planned::Timed { at, line, action } if self.is_reached() => {
                 self.later(at, TimedDue::Action(line, action))?;
@@ -487,7 +489,7 @@ impl Replay {
 
 fn apply_factor(source: &mut Source, input: Input) {
     match input {
-        Input::Speed(factor) => source.interpreter.set_speed_factor(factor),
+        Input::Speed(factor) => source.set_speed_factor(factor),
         Input::Flow(factor) => source.interpreter.set_flow_factor(factor),
         Input::FinishRun | Input::Fan(_) | Input::Target(..) => {}
     }

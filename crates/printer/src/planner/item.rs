@@ -5,6 +5,8 @@ use motion::PlannedMove;
 use steps::StepCommand;
 use units::{Celsius, Seconds};
 
+use crate::pace::Pace;
+
 /// A machine position: X, Y, Z in mm and the extruder in mm of filament.
 pub type Position = [f64; 4];
 
@@ -82,7 +84,7 @@ pub enum Planned {
     /// A run of motion starts at rest at this position.
     RunStarted(Position),
     /// A move's final speeds; its steps follow, though not at once.
-    Move(PlannedMove),
+    Move(PlannedMove, Pace),
     /// A motor's next step command.
     Steps(StepCommand),
     /// Something that happens on the way.

@@ -8,6 +8,7 @@
 mod dynamics;
 mod guard;
 mod item;
+mod paces;
 mod report;
 mod skip;
 mod source;
@@ -24,10 +25,13 @@ use units::{Hertz, MmPerS, Seconds, Ticks};
 use dynamics::Course;
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
+use paces::Paces;
 pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanStream, Ramps};
 pub(crate) use skip::{Skip, Skipped};
 pub(crate) use source::Next;
 pub use source::{SOURCE_BYTES_MAX, Source};
+
+pub use crate::pace::Pace;
 
 use crate::{
     config::{PrinterConfig, UnreachableSpeed},
@@ -86,6 +90,7 @@ pub struct Planner {
     run: Run,
     moves_pushed: u64,
     moves_planned: u64,
+    paces: Paces,
     /// Print time at which the last planned move ends.
     planned_until: Seconds,
     /// Print time at which the last dwell of this run ends.
@@ -119,6 +124,7 @@ impl Planner {
             run: Run::None,
             moves_pushed: 0,
             moves_planned: 0,
+            paces: Paces::default(),
             planned_until: Seconds::ZERO,
             dwelt_until: Seconds::ZERO,
             deferred: VecDeque::new(),
@@ -252,6 +258,7 @@ impl Planner {
         self.ready.clear();
         self.barrier = None;
         self.moves_planned = self.moves_pushed;
+        self.paces.clear();
         self.run = Run::None;
     }
 
@@ -262,7 +269,7 @@ impl Planner {
         feed: MmPerS,
         line: LineNumber,
     ) -> Result<(), PrinterError> {
-        self.push(to, feed, line)
+        self.push(to, feed, line, Pace::default())
     }
 
     /// The next item of the plan.
@@ -431,7 +438,7 @@ impl Planner {
         self.guard.judge(&Move { from, ..*mv })?;
         let feed = self.feed(mv, to, source);
         self.judge_torque(to, feed, mv.line)?;
-        self.push(to, feed, mv.line)
+        self.push(to, feed, mv.line, source.pace())
     }
 
     /// A move's feed; one that a factor has made faster than the motors can follow is slowed down to what they can.
@@ -469,7 +476,7 @@ impl Planner {
         Ok(())
     }
 
-    fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber) -> Result<(), PrinterError> {
+    fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber, pace: Pace) -> Result<(), PrinterError> {
         if to == self.position {
             return Ok(());
         }
@@ -489,7 +496,11 @@ impl Planner {
         let request = MoveRequest { from: self.position, to, feed, tag: line.0 };
         self.look_ahead.push(&request).map_err(|error| wrong(&error).at_line(line.0))?;
         // The look-ahead drops moves without length.
-        self.moves_pushed += (self.look_ahead.len() - before) as u64;
+        let pushed = (self.look_ahead.len() - before) as u64;
+        if pushed > 0 {
+            self.paces.push(self.moves_pushed, pace);
+        }
+        self.moves_pushed += pushed;
         self.position = to;
         if let Some(bound) = &mut self.bound {
             bound.push(&request, &self.limits);
@@ -515,9 +526,10 @@ impl Planner {
         }
         self.generator.push(&planned).map_err(|error| self.unsteppable(error, Some(planned.tag)))?;
         self.planned_until = Seconds(planned.end_time());
+        let pace = self.paces.take(self.moves_planned);
         self.moves_planned += 1;
         self.course.planned(self.moves_planned, &mut self.generator);
-        self.ready.push_back(Planned::Move(planned));
+        self.ready.push_back(Planned::Move(planned, pace));
         while let Some(deferred) = self.deferred.pop_front_if(|deferred| deferred.after <= self.moves_planned)
         {
             let Deferred { line, action, not_before, .. } = deferred;

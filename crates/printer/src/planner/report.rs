@@ -200,7 +200,7 @@ impl PlanStream {
         loop {
             match self.planner.next(&mut self.source)? {
                 Planned::NeedsInput | Planned::EndOfSource => return Ok(()),
-                Planned::Move(planned) => {
+                Planned::Move(planned, _) => {
                     self.report.moves += 1;
                     self.report.filament_mm += planned.to[EXTRUDER] - planned.from[EXTRUDER];
                     each_move(&planned);

@@ -5,6 +5,8 @@ use gcode::{
 };
 use units::{Mm, MmPerS};
 
+use crate::pace::Pace;
+
 /// The most bytes a source holds before it says that it wants no more.
 pub const SOURCE_BYTES_MAX: usize = 64 * 1024;
 
@@ -24,6 +26,10 @@ pub struct Source {
     /// The toolhead's extruder position less the interpreter's, which counts from its own start, in mm of filament.
     pub(super) e_offset: f64,
     line: LineNumber,
+    /// The speed factor of that line's moves.
+    pace: Pace,
+    /// As the user set it last.
+    wanted: Pace,
 }
 
 /// What a source has next.
@@ -55,6 +61,8 @@ impl Source {
             chords: None,
             e_offset: 0.0,
             line: LineNumber(0),
+            pace: Pace::default(),
+            wanted: Pace::default(),
         }
     }
 
@@ -108,6 +116,23 @@ impl Source {
         self.line
     }
 
+    /// The user sets the speed factor of the lines that follow.
+    pub fn set_speed_factor(&mut self, factor: f64) {
+        self.interpreter.set_speed_factor(factor);
+        let factor = self.interpreter.speed_factor();
+        self.wanted = Pace { factor, changes: self.wanted.changes.wrapping_add(1) };
+    }
+
+    /// What the user set last.
+    pub const fn wanted_pace(&self) -> Pace {
+        self.wanted
+    }
+
+    /// That of the moves of the line that was read last.
+    pub(super) const fn pace(&self) -> Pace {
+        self.pace
+    }
+
     /// Forgets everything that was fed and not yet read.
     pub fn clear(&mut self) {
         self.lines = Lines::new();
@@ -158,6 +183,8 @@ impl Source {
             self.line = line.number;
             self.interpreter.line(line.number, line.bytes, &mut self.actions, &mut self.diagnostics);
             self.diagnostics.reverse();
+            let factor = self.interpreter.speed_factor();
+            self.pace = Pace { factor, changes: self.wanted.changes };
         }
     }
 }

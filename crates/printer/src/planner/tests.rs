@@ -53,7 +53,7 @@ fn plan(text: &str) -> Vec<Planned> {
 fn moves(items: &[Planned]) -> Vec<PlannedMove> {
     items
         .iter()
-        .filter_map(|item| if let Planned::Move(mv) = item { Some(mv.clone()) } else { None })
+        .filter_map(|item| if let Planned::Move(mv, _) = item { Some(mv.clone()) } else { None })
         .collect()
 }
 
@@ -121,7 +121,7 @@ fn barriers_come_at_rest_and_before_what_follows() {
         ),
     ] {
         let items = plan(&format!("G1 X10 F6000\n{line}\nG1 X20\n"));
-        let kinds: Vec<&Planned> = items.iter().filter(|item| !matches!(item, Planned::Move(_))).collect();
+        let kinds: Vec<&Planned> = items.iter().filter(|item| !matches!(item, Planned::Move(..))).collect();
         let [
             Planned::RunStarted(_),
             Planned::RunEnded(_),

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     clock_sync::ClockSync,
-    link::{Clocks, Lane, Link, Outgoing},
+    link::{Clocks, Lane, Link, Outgoing, SCHEDULE_AHEAD_TICKS_MAX},
     machine::MOTORS,
 };
 
@@ -23,6 +23,13 @@ const OUTPUT_LEAD_LOSSY: Seconds = Seconds(1.0);
 const RUN_LEAD: Seconds = Seconds(0.25);
 /// … and on one that has been losing blocks.
 const RUN_LEAD_LOSSY: Seconds = Seconds(1.2);
+
+/// How much motion is planned and sent ahead of the board's clock, where it can be held at any place …
+const HORIZON: Seconds = Seconds(10.0);
+/// … and this much less than half of the clock's range, which is little on fast boards …
+const HORIZON_SPARE: Seconds = Seconds(0.25);
+/// … and where a pause runs it empty.
+const HORIZON_PLAIN: Seconds = Seconds(4.0);
 
 /// A board's word on its motion clock cannot come from further ahead than this: the clock is an estimate.
 const REPORT_SLACK: Seconds = Seconds(0.1);
@@ -69,7 +76,7 @@ impl Board {
         self.motion.at(self.clock_at(now))
     }
 
-    /// The hardware clock of a motion clock, should motion go on at its full rate.
+    /// The hardware clock of a motion clock at the earliest: should motion go on at its full rate.
     pub(super) fn hardware_of(&self, motion: Ticks, now: Seconds) -> Ticks {
         self.motion.hardware(motion, self.clock_at(now))
     }
@@ -77,7 +84,23 @@ impl Board {
     /// Both clocks now.
     pub(super) fn clocks(&self, now: Seconds) -> Clocks {
         let hardware = self.clock_at(now);
-        Clocks { hardware, motion: self.motion.at(hardware), is_steady: self.motion.is_steady() }
+        Clocks { hardware, motion: self.motion.at(hardware), rate: self.motion.even_rate() }
+    }
+
+    /// How much motion is planned and sent ahead of the motion clock, at most.
+    pub(super) fn horizon(&self) -> Ticks {
+        if self.layout.has_motion_clock {
+            let range = SCHEDULE_AHEAD_TICKS_MAX.saturating_sub(self.ticks(HORIZON_SPARE));
+            self.ticks(HORIZON).min(range)
+        } else {
+            self.ticks(HORIZON_PLAIN)
+        }
+    }
+
+    /// The board is set up, with room for so many moves.
+    pub(super) fn begin(&mut self, move_count: u16) {
+        self.link.set_board(self.clock, move_count);
+        self.link.set_horizon(self.clock.duration_of(self.horizon()));
     }
 
     /// Takes the board's word on its motion clock; its hardware clock then, if that can be.
@@ -88,6 +111,24 @@ impl Board {
             slack: self.ticks(REPORT_SLACK),
         };
         self.motion.report(report, heard)
+    }
+
+    /// Has motion come to rest on its path, by a ramp of so many ticks.
+    pub(super) fn hold_motion(&mut self, ramp: Ticks, now: Seconds) {
+        self.motion.tell_rest(true, self.clock_at(now));
+        self.control(&Command::MotionHold { ramp: ramp.0 as u32 });
+    }
+
+    /// Has motion go on, by a ramp of so many ticks.
+    pub(super) fn resume_motion(&mut self, ramp: Ticks, now: Seconds) {
+        self.motion.tell_rest(false, self.clock_at(now));
+        self.control(&Command::MotionResume { ramp: ramp.0 as u32 });
+    }
+
+    /// Has motion go at this rate, by a ramp of so many ticks.
+    pub(super) fn set_rate(&mut self, rate: u16, ramp: Ticks, now: Seconds) {
+        self.motion.tell(rate, self.clock_at(now));
+        self.control(&Command::MotionRate { rate, ramp: ramp.0 as u32 });
     }
 
     /// A duration in ticks of the nominal clock: what every plan is made in.

@@ -310,8 +310,7 @@ impl Connecting {
                 if crc != self.board.layout.crc || !self.board.layout.has_motion_clock {
                     return Ok(Some(Outcome::NeedsRestart));
                 }
-                let clock = self.board.clock;
-                self.board.link.set_board(clock, move_count);
+                self.board.begin(move_count);
                 self.step = Step::Asking;
                 Ok(None)
             }
@@ -330,8 +329,7 @@ impl Connecting {
                 Err(PrinterError::new(ErrorCode::BoardTooSmall, detail))
             }
             Step::Sent if is_config && crc == self.board.layout.crc => {
-                let clock = self.board.clock;
-                self.board.link.set_board(clock, move_count);
+                self.board.begin(move_count);
                 Ok(Some(Outcome::Ready))
             }
             Step::Sent if is_config => Err(ErrorCode::ConfigMismatch.into()),

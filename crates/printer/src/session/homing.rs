@@ -1,7 +1,8 @@
 //! Homing: an axis runs towards its endstop until the board itself sees it and stops the motor, backs off, and does it
 //! again more slowly. The position comes from where the motor stopped, never from the plan.
 //!
-//! The board's trigger fires by itself when the host falls silent, so a lost link stops the axis.
+//! The board's trigger fires by itself when the host falls silent, so a lost link stops the axis. Where that was but a
+//! bad moment of the line, the axis goes on from where it stands, a few times: no further altogether than one approach goes.
 
 use units::{Seconds, Ticks};
 use wire::Command;
@@ -37,6 +38,13 @@ const SAMPLES: u8 = 4;
 const TRAVEL_FACTOR: f64 = 1.5;
 /// The second approach starts this many retractions away at most.
 const SECOND_TRAVEL_FACTOR: f64 = 2.0;
+/// How often an approach is begun at most: it goes on when the board stopped it for want of a word from the host.
+const TRIES_MAX: u8 = 3;
+/// But not where host and board were apart for this long: by then nobody expects that anything moves.
+const APART_MAX: Seconds = Seconds(2.0);
+
+/// Why the board stopped an axis by itself.
+const NOT_HEARD: &str = "the board heard nothing from the host";
 
 /// A straight move that homing wants made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +66,8 @@ pub(super) enum Wish {
     Move(HomingMove),
     /// The motor has been stopped by the trigger: forget what was planned.
     Abandon,
+    /// The board stopped the motor because it had heard nothing; it now goes on. The user should know of it.
+    GoesOn,
     /// The axis is home.
     Done,
     /// The axis stands still because it was told to; where, nobody knows.
@@ -101,6 +111,14 @@ pub(super) struct AxisHoming {
     asked: Option<(Seconds, Seconds)>,
     position_before: i32,
     abandon: bool,
+    /// The board stopped the approach because it heard nothing; to be told once it goes on.
+    expired: bool,
+    goes_on: bool,
+    /// Host and board have been apart for long in the present approach.
+    apart: bool,
+    /// How often the present approach has been begun, and the steps that it has made.
+    tries: u8,
+    approach_steps: u64,
     /// Steps made in both approaches, as the board counted them.
     pub(super) steps: u64,
     endstop_mm: f64,
@@ -124,6 +142,11 @@ impl AxisHoming {
             asked: None,
             position_before: 0,
             abandon: false,
+            expired: false,
+            goes_on: false,
+            apart: false,
+            tries: 0,
+            approach_steps: 0,
             steps: 0,
             endstop_mm: config.position_endstop.0,
             retract_mm: config.homing_retract_dist.0,
@@ -137,6 +160,12 @@ impl AxisHoming {
     /// Where the axis is once it is home, in mm.
     pub(super) const fn position_mm(&self) -> f64 {
         self.endstop_mm
+    }
+
+    /// How far the present approach may still go, in mm: however often it is begun, no further than one approach goes.
+    fn travel_left_mm(&self) -> f64 {
+        let travel = if self.second { SECOND_TRAVEL_FACTOR * self.retract_mm } else { self.travel_mm };
+        travel - self.approach_steps as f64 * self.step_mm
     }
 
     /// The axis is to stop.
@@ -181,15 +210,16 @@ impl AxisHoming {
         if self.cancelled && self.stands(at_rest) {
             return Ok(Wish::Cancelled);
         }
+        if core::mem::take(&mut self.goes_on) {
+            return Ok(Wish::GoesOn);
+        }
         match self.stage {
             Stage::PositionBefore | Stage::PositionAfter => {
                 self.ask(&Command::StepperGetPosition { oid: self.stepper }, board, now)?;
                 Ok(Wish::Wait)
             }
             Stage::Plan => {
-                let travel =
-                    if self.second { SECOND_TRAVEL_FACTOR * self.retract_mm } else { self.travel_mm };
-                let from_mm = self.endstop_mm - self.sign * travel;
+                let from_mm = self.endstop_mm - self.sign * self.travel_left_mm();
                 let speed = self.speeds[usize::from(self.second)];
                 Ok(Wish::Move(HomingMove { from_mm, to_mm: self.endstop_mm, speed }))
             }
@@ -252,6 +282,8 @@ impl AxisHoming {
             trsync_oid: trsync,
             trigger_reason: REASON_ENDSTOP,
         });
+        self.tries += 1;
+        self.apart = false;
         self.enter(Stage::Approach { start, end: None, kept_alive: now, heard: now });
     }
 
@@ -262,14 +294,23 @@ impl AxisHoming {
         }
     }
 
+    /// Where they were apart for too long, an approach that the board has stopped does not go on.
+    fn note_apart(&mut self, now: Seconds) {
+        if let Stage::Approach { kept_alive, heard, .. } = self.stage {
+            self.apart |= now - kept_alive > APART_MAX || now - heard > APART_MAX;
+        }
+    }
+
     fn watch(&mut self, board: &mut Board, now: Seconds) -> Result<Wish, PrinterError> {
+        self.note_apart(now);
         let Stage::Approach { start, end, kept_alive, heard } = &mut self.stage else {
             return Ok(Wish::Wait);
         };
         let clock_now = board.clock_at(now);
         if now - *kept_alive >= KEEP_ALIVE {
             *kept_alive = now;
-            let clock = (clock_now + board.ticks(EXPIRE)).low().0;
+            // Never before the axis moves: a stepper that is stopped first would start all the same.
+            let clock = (clock_now.max(*start) + board.ticks(EXPIRE)).low().0;
             board.control(&Command::TrsyncSetTimeout { oid: self.oids.trsync.0, clock });
         }
         let overdue = end.is_some_and(|end| clock_now > end + board.ticks(REPORT));
@@ -299,6 +340,7 @@ impl AxisHoming {
         now: Seconds,
         board: &mut Board,
     ) -> Result<(), PrinterError> {
+        self.note_apart(now);
         let Stage::Approach { heard, .. } = &mut self.stage else { return Ok(()) };
         if oid != self.oids.trsync.0 {
             return Ok(());
@@ -317,9 +359,12 @@ impl AxisHoming {
                 self.stopped(board);
                 Ok(())
             }
-            REASON_EXPIRED => {
-                Err(self.fail(ErrorCode::HomingTimeout, "the board heard nothing from the host"))
+            REASON_EXPIRED if self.tries < TRIES_MAX && !self.apart => {
+                self.expired = true;
+                self.stopped(board);
+                Ok(())
             }
+            REASON_EXPIRED => Err(self.fail(ErrorCode::HomingTimeout, NOT_HEARD)),
             _ => Err(self.fail(ErrorCode::EndstopNotReached, "")),
         }
     }
@@ -344,6 +389,20 @@ impl AxisHoming {
         });
         self.abandon = true;
         self.enter(Stage::PositionAfter);
+    }
+
+    /// Begins an approach that the time-out has ended once more, from where the motor stands.
+    fn go_on(&mut self, position: i32, now: Seconds) -> Result<(), PrinterError> {
+        if self.asked.is_some_and(|(first, _)| now - first > APART_MAX) {
+            return Err(self.fail(ErrorCode::HomingTimeout, NOT_HEARD));
+        }
+        if self.travel_left_mm() < self.step_mm {
+            return Err(self.fail(ErrorCode::EndstopNotReached, ""));
+        }
+        self.position_before = position;
+        self.goes_on = true;
+        self.enter(Stage::Plan);
+        Ok(())
     }
 
     /// The board reports the state of a switch.
@@ -374,6 +433,7 @@ impl AxisHoming {
             }
             Stage::Released => {
                 self.second = true;
+                (self.tries, self.approach_steps) = (0, 0);
                 self.enter(Stage::PositionBefore);
                 Ok(())
             }
@@ -382,7 +442,7 @@ impl AxisHoming {
     }
 
     /// The board reports where a motor stands.
-    pub(super) fn on_position(&mut self, oid: u8, position: i32) -> Result<(), PrinterError> {
+    pub(super) fn on_position(&mut self, oid: u8, position: i32, now: Seconds) -> Result<(), PrinterError> {
         if oid != self.stepper {
             return Ok(());
         }
@@ -392,9 +452,13 @@ impl AxisHoming {
                 self.enter(Stage::Plan);
             }
             Stage::PositionAfter => {
-                let made = position.wrapping_sub(self.position_before).unsigned_abs();
-                self.steps += u64::from(made);
-                if self.second && made == 0 {
+                let made = u64::from(position.wrapping_sub(self.position_before).unsigned_abs());
+                self.steps += made;
+                self.approach_steps += made;
+                if core::mem::take(&mut self.expired) {
+                    return self.go_on(position, now);
+                }
+                if self.second && self.approach_steps == 0 {
                     // It was open after backing off: closed without a step it is no switch at the axis' end.
                     return Err(self.fail(ErrorCode::EndstopBeforeMove, "on its second approach"));
                 }

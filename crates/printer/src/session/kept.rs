@@ -36,6 +36,8 @@ pub(super) struct Kept {
     /// The part fan's speed now, and what is to come of it.
     fan: f64,
     fans: VecDeque<(Ticks, f64)>,
+    /// Of these, so many have been given to the board.
+    fans_given: usize,
 }
 
 /// What was kept, from where the board has dropped it.
@@ -72,6 +74,14 @@ impl Kept {
     /// What was to come of the fan does not.
     pub(super) fn forget_fans(&mut self) {
         self.fans.clear();
+        self.fans_given = 0;
+    }
+
+    /// The next change of the fan until a motion clock that has not been given to the board: now it is.
+    pub(super) fn next_fan(&mut self, until: Ticks) -> Option<(Ticks, f64)> {
+        let next = self.fans.get(self.fans_given).copied().filter(|(at, _)| *at <= until)?;
+        self.fans_given += 1;
+        Some(next)
     }
 
     /// Whether no more changes of the fan are taken.
@@ -88,6 +98,7 @@ impl Kept {
         }
         while let Some((_, speed)) = self.fans.pop_front_if(|(at, _)| *at <= motion_now) {
             self.fan = speed;
+            self.fans_given = self.fans_given.saturating_sub(1);
         }
     }
 
@@ -108,6 +119,7 @@ impl Kept {
             }
             from[motor] = self.from[motor].after(queue);
         }
+        self.fans_given = 0;
         let rows = core::mem::take(&mut self.lanes).map(|lane| lane.rows);
         Ok(Left { rows, from, fan: self.fan, fans: core::mem::take(&mut self.fans) })
     }
@@ -178,7 +190,12 @@ mod tests {
         for (at, speed) in [(10, 0.1), (20, 0.2), (30, 0.3)] {
             kept.push_fan(Ticks(at), speed);
         }
+        assert_eq!(kept.next_fan(Ticks(9)), None);
+        assert_eq!(kept.next_fan(Ticks(25)), Some((Ticks(10), 0.1)));
+        assert_eq!(kept.next_fan(Ticks(25)), Some((Ticks(20), 0.2)));
+        assert_eq!(kept.next_fan(Ticks(25)), None);
         kept.forget(Ticks(0), Ticks(20));
+        assert_eq!(kept.clone().next_fan(Ticks(30)), Some((Ticks(30), 0.3)));
         let left = kept.cut(&[queue(0, 0); MOTORS]).unwrap();
         assert_eq!((left.fan, left.fans), (0.2, VecDeque::from([(Ticks(30), 0.3)])));
     }

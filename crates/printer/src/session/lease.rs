@@ -111,6 +111,7 @@ impl Lease {
             return;
         }
         let Some(told) = self.told else {
+            // Until then nothing slows it down.
             if board.motion.is_steady() {
                 board.motion.trust(board.clock_at(now));
                 self.begin(run, board, now);
@@ -131,7 +132,10 @@ impl Lease {
         }
         let ends = cover.is_end && !told.has_end;
         // Renewed behind its end, it would be one that covers nothing.
-        let lasts = told.has_end && board.hardware_of(told.covered, now) < told.alive;
+        let clocks = board.clocks(now);
+        let until_end = clocks.until_motion(told.covered).filter(|_| told.has_end);
+        let is_over = told.has_end && clocks.motion >= told.covered;
+        let lasts = is_over || until_end.is_some_and(|until| clocks.hardware + until < told.alive);
         if ends || !lasts && now - told.at >= RENEW {
             self.tell(cover, board, now);
         }

@@ -24,6 +24,7 @@ mod lease;
 mod motion_time;
 mod ready;
 mod request;
+mod run;
 mod stream;
 mod thermal;
 

@@ -1,9 +1,11 @@
 //! What the host knows of the board's motion clock, by which steps are made: it follows the hardware clock, but for
-//! holds, which leave it behind.
+//! holds, which leave it behind, and for motion that this host slows down.
 //!
 //! While motion goes at its full rate the two are a fixed lag apart. The board tells that lag, several times a second
-//! while there is a lease; in a ramp there is none, and nothing new may be started. A board without a motion clock
-//! never tells, and the lag stays zero.
+//! while there is a lease or motion is slowed down; in a ramp there is none, and where it is not fixed nothing new may be
+//! started. A board without a motion clock never tells, and the lag stays zero.
+//!
+//! What is claimed of the motion clock is never beyond what it can be: steps that have not been made still take room.
 //!
 //! After a long silence 32 bits are little: what the board said meanwhile may have waited on the line, and both clocks may
 //! have gone round unseen. Then only what was certainly said since counts.
@@ -11,12 +13,14 @@
 //! Knows no board and no lease. Clocks in ticks, 64 bits: those of the motion clock are the host's own continuation of
 //! the 32 bits on the wire.
 
+use core::num::NonZeroU16;
+
 use units::{Clock32, Ticks};
+
+use crate::pace::RATE_ONE;
 
 /// After a silence of this many ticks, what arrives may have been said at any time in it.
 const SILENCE_LONG: Ticks = Ticks(1 << 30);
-/// The full rate on the wire.
-const RATE_ONE: u16 = 4096;
 
 /// What the board's motion does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,6 +86,14 @@ pub(super) struct MotionTime {
     motion: Ticks,
     rate: u16,
     state: MotionState,
+    /// It slows down, or is slow, because it is held.
+    is_hold: bool,
+    /// The rate that the board was last told.
+    told: u16,
+    /// It was told to come to rest, and not to go on.
+    rests: bool,
+    /// The clock of its last word.
+    heard: Ticks,
     /// Since this hardware clock nothing is claimed beyond what is known: the board may have done anything.
     in_doubt: Option<Ticks>,
 }
@@ -104,23 +116,29 @@ impl Default for MotionTime {
             motion: Ticks(0),
             rate: RATE_ONE,
             state: MotionState::Running,
+            is_hold: false,
+            told: RATE_ONE,
+            rests: false,
+            heard: Ticks(0),
             in_doubt: None,
         }
     }
 }
 
 impl MotionTime {
-    /// The motion clock at a hardware clock; never beyond what it can be. While it slows, no more is claimed than was told:
-    /// what it was told to run at, it runs at no longer.
+    /// The motion clock at a hardware clock; never beyond what it can be. While it comes to rest, no more is claimed than
+    /// was told: what it was told to run at, it runs at no longer.
     pub(super) fn at(&self, clock: Ticks) -> Ticks {
-        if self.in_doubt.is_some() {
+        if self.in_doubt.is_some() || self.rests {
             return self.motion;
         }
         let since = clock.0 as i64 - self.clock.0 as i64;
-        let made = match (self.state, self.rate) {
-            (MotionState::Running, RATE_ONE) => since,
-            (MotionState::Slowing, _) => 0,
-            (_, rate) => since.max(0) / i64::from(RATE_ONE) * i64::from(rate.min(RATE_ONE)),
+        let made = match self.state {
+            // A lower rate may be in force already, a higher one not yet.
+            MotionState::Running => scaled(since, self.rate.min(self.told)),
+            MotionState::Slowing if self.is_hold => 0,
+            MotionState::Slowing => scaled(since.max(0), self.rate.min(self.told)),
+            MotionState::Held | MotionState::Speeding => scaled(since.max(0), self.rate),
         };
         Ticks(self.motion.0.saturating_add_signed(made))
     }
@@ -130,10 +148,40 @@ impl MotionTime {
         if self.is_steady() { self.at(clock) } else { self.motion + clock.saturating_sub(self.clock) }
     }
 
-    /// The hardware clock at which the motion clock gets to `motion`, should it run at the full rate from now on.
+    /// The hardware clock at which the motion clock gets to `motion` at the earliest: at the full rate from now on.
     pub(super) fn hardware(&self, motion: Ticks, clock_now: Ticks) -> Ticks {
-        let ahead = motion.0 as i64 - self.at(clock_now).0 as i64;
+        let ahead = motion.0 as i64 - self.latest(clock_now).0 as i64;
         Ticks(clock_now.0.saturating_add_signed(ahead))
+    }
+
+    /// The rate that motion has, or is about to have where that is more; nothing where that cannot be said.
+    pub(super) fn even_rate(&self) -> Option<NonZeroU16> {
+        NonZeroU16::new(self.rate.max(self.told)).filter(|_| self.is_running())
+    }
+
+    /// The board is told another rate.
+    pub(super) fn tell(&mut self, rate: u16, clock_now: Ticks) {
+        self.rebase(clock_now);
+        self.told = rate;
+    }
+
+    /// The board is told to come to rest, or to go on.
+    pub(super) fn tell_rest(&mut self, rests: bool, clock_now: Ticks) {
+        self.rebase(clock_now);
+        self.rests = rests;
+    }
+
+    /// What is claimed by now stays so.
+    fn rebase(&mut self, clock_now: Ticks) {
+        if self.is_running() {
+            self.motion = self.at(clock_now);
+            self.clock = clock_now;
+        }
+    }
+
+    /// Whether motion goes at the rate that the board was last told.
+    pub(super) const fn is_as_told(&self) -> bool {
+        self.is_running() && self.rate == self.told
     }
 
     /// Whether motion is at rest, wherever on its path.
@@ -141,21 +189,31 @@ impl MotionTime {
         self.in_doubt.is_none() && matches!(self.state, MotionState::Held)
     }
 
-    /// Whether the two clocks are a fixed lag apart.
+    /// Whether motion is held, slows down for that, or what it does is not known.
+    pub(super) const fn may_rest(&self) -> bool {
+        self.in_doubt.is_some() || self.is_hold
+    }
+
+    /// Whether motion goes at an even rate.
+    pub(super) const fn is_running(&self) -> bool {
+        self.in_doubt.is_none() && !self.rests && matches!(self.state, MotionState::Running)
+    }
+
+    /// Whether the two clocks are a fixed lag apart, and stay so.
     pub(super) const fn is_steady(&self) -> bool {
-        self.in_doubt.is_none() && matches!(self.state, MotionState::Running) && self.rate == RATE_ONE
+        self.is_running() && self.rate == RATE_ONE && self.told == RATE_ONE
     }
 
     /// The clock up to which the board's word is known.
     pub(super) const fn known_until(&self) -> Ticks {
-        self.clock
+        self.heard
     }
 
     /// Nothing has been leased before `clock`, so the two clocks run on together up to there.
     pub(super) fn trust(&mut self, clock: Ticks) {
         if self.is_steady() {
             self.motion = self.at(clock);
-            self.clock = clock;
+            (self.clock, self.heard) = (clock, clock);
         }
     }
 
@@ -167,7 +225,7 @@ impl MotionTime {
     /// Takes the board's word; gives the report's clock, or nothing for one that cannot be, or may be old.
     pub(super) fn report(&mut self, report: &MotionReport, heard: Heard) -> Option<Ticks> {
         let Heard { clock_now, said_after, slack } = heard;
-        let is_stale = |doubted: Ticks| doubted > self.clock + SILENCE_LONG && said_after < doubted;
+        let is_stale = |doubted: Ticks| doubted > self.heard + SILENCE_LONG && said_after < doubted;
         if self.in_doubt.is_some_and(is_stale) {
             return None;
         }
@@ -176,9 +234,10 @@ impl MotionTime {
             return None;
         }
         self.motion = self.about(report, clock).nearest(report.motion);
-        self.clock = clock;
-        self.rate = report.rate;
+        (self.clock, self.heard) = (clock, clock);
+        self.rate = report.rate.min(RATE_ONE);
         self.state = report.state;
+        self.is_hold = report.reason != HoldReason::None;
         self.in_doubt = None;
         Some(clock)
     }
@@ -189,12 +248,18 @@ impl MotionTime {
         match (self.in_doubt, report.state) {
             (None, _) => self.at(clock),
             (Some(_), MotionState::Running) => {
-                let since = clock.saturating_sub(self.clock).0;
-                self.motion + Ticks(since / u64::from(RATE_ONE) * u64::from(report.rate.min(RATE_ONE)))
+                let since = clock.saturating_sub(self.clock).0 as i64;
+                Ticks(self.motion.0.saturating_add_signed(scaled(since, report.rate.min(RATE_ONE))))
             }
             (Some(_), _) => self.motion,
         }
     }
+}
+
+/// Motion in so many ticks at a rate, rounded down.
+fn scaled(ticks: i64, rate: u16) -> i64 {
+    let scaled = i128::from(ticks) * i128::from(rate);
+    i64::try_from(scaled.div_euclid(i128::from(RATE_ONE))).unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -247,6 +312,51 @@ mod tests {
         assert_eq!(time.report(&report, heard(1000)), None);
         assert_eq!(time.report(&report, heard(5001)), Some(Ticks(5000)));
         assert_eq!(time.at(Ticks(6000)), Ticks(6000));
+    }
+
+    #[test]
+    fn a_lower_rate_is_believed_at_once_and_a_higher_one_when_the_board_says_so() {
+        let mut time = MotionTime::default();
+        time.trust(Ticks(1000));
+        time.tell(1024, Ticks(2000));
+        // Whether it has been heard yet is not known: never beyond what it can be.
+        assert_eq!((time.at(Ticks(2000)), time.at(Ticks(6003))), (Ticks(2000), Ticks(3000)));
+        assert_eq!(time.latest(Ticks(6003)), Ticks(6003));
+        assert_eq!(time.even_rate().map(NonZeroU16::get), Some(RATE_ONE));
+        assert!(!time.is_steady() && time.is_running() && !time.is_as_told());
+        let mut report = |clock: u32, motion: u32, rate, state| {
+            let report = MotionReport::new(clock, motion, rate, state, 0);
+            assert!(time.report(&report, heard(u64::from(clock) + 10)).is_some());
+            time
+        };
+        assert_eq!(report(6000, 5000, 2000, 1).at(Ticks(6400)), Ticks(5100));
+        let slow = report(7000, 5500, 1024, 0);
+        assert!(slow.is_as_told() && !slow.is_steady() && !slow.may_rest());
+        assert_eq!((slow.at(Ticks(11_003)), slow.at(Ticks(6996))), (Ticks(6500), Ticks(5499)));
+        assert_eq!(slow.hardware(Ticks(6000), Ticks(7000)), Ticks(7500));
+        let mut time = slow;
+        time.tell(RATE_ONE, Ticks(11_000));
+        assert_eq!((time.at(Ticks(11_000)), time.at(Ticks(15_000))), (Ticks(6500), Ticks(7500)));
+        assert!(!time.is_steady());
+        let report = MotionReport::new(16_000, 9000, RATE_ONE, 0, 0);
+        assert!(time.report(&report, heard(16_000)).is_some() && time.is_steady());
+        assert_eq!(time.at(Ticks(16_100)), Ticks(9100));
+    }
+
+    #[test]
+    fn what_is_told_to_rest_makes_nothing_more_until_the_board_says_so() {
+        let mut time = MotionTime::default();
+        time.trust(Ticks(1000));
+        time.tell_rest(true, Ticks(3000));
+        assert_eq!((time.at(Ticks(9000)), time.is_running()), (Ticks(3000), false));
+        assert_eq!(time.latest(Ticks(9000)), Ticks(9000));
+        assert!(time.report(&MotionReport::new(3500, 3500, RATE_ONE, 0, 0), heard(3600)).is_some());
+        assert_eq!(time.at(Ticks(9000)), Ticks(3500));
+        assert!(time.report(&MotionReport::new(5000, 4200, 0, 2, 1), heard(5000)).is_some());
+        time.tell_rest(false, Ticks(6000));
+        assert_eq!((time.at(Ticks(9000)), time.is_held()), (Ticks(4200), true));
+        assert!(time.report(&MotionReport::new(8000, 5000, RATE_ONE, 0, 0), heard(8000)).is_some());
+        assert_eq!((time.at(Ticks(9000)), time.is_steady()), (Ticks(6000), true));
     }
 
     #[test]

@@ -31,6 +31,13 @@ impl Session {
         }
         let Stage::Ready(ready) = &mut self.stage else { return Err(ErrorCode::NotConnected.into()) };
         ready.last_active = now;
+        let request = match request {
+            // Not a line of the console's own: it is for the print.
+            Request::Gcode(text) if ready.job.is_some() => {
+                factor_typed(&text).unwrap_or(Request::Gcode(text))
+            }
+            request => request,
+        };
         match request {
             Request::Gcode(text) => ready.idle_console()?.type_text(text)?,
             Request::MoveBy { axis, distance, speed } => {
@@ -231,6 +238,18 @@ fn is_emergency(text: &str) -> bool {
     })
 }
 
+/// What sets a factor where that is all that was typed: `M220 S50`, in percent.
+fn factor_typed(text: &str) -> Option<Request> {
+    let line = text.split(';').next().unwrap_or_default().trim().to_ascii_uppercase();
+    let (request, rest): (fn(f64) -> Request, _) = if let Some(rest) = line.strip_prefix("M220") {
+        (Request::SetSpeedFactor, rest)
+    } else {
+        (Request::SetFlowFactor, line.strip_prefix("M221")?)
+    };
+    let percent: f64 = rest.trim_start().strip_prefix('S')?.trim_start().parse().ok()?;
+    (percent.is_finite() && percent > 0.0).then(|| request(percent / 100.0))
+}
+
 impl Ready {
     /// The console, unless a job is what is carried out.
     fn idle_console(&mut self) -> Result<&mut Console, PrinterError> {
@@ -271,7 +290,7 @@ impl Ready {
         }
         for source in self.sources() {
             match input {
-                Input::Speed(factor) => source.interpreter.set_speed_factor(factor),
+                Input::Speed(factor) => source.set_speed_factor(factor),
                 Input::Flow(factor) => source.interpreter.set_flow_factor(factor),
                 _ => {}
             }

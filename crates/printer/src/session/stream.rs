@@ -6,26 +6,25 @@
 
 use std::collections::VecDeque;
 
-use gcode::LineNumber;
 use steps::{StepCommand, StepCommandKind};
 use units::{Seconds, Ticks};
 use wire::Command;
 
+pub(super) use super::run::{Cut, Due, Run, TakenUp, leaves_hot};
 use super::{
     board::{Board, FAN_LANE},
     event::ScheduledMove,
-    kept::{KEPT_AFTER, Kept, Left},
+    kept::{KEPT_AFTER, Kept},
 };
 use crate::{
     error::PrinterError,
     journal::{MotorQueue, Row, RowPlace},
     link::Lane,
     machine::MOTORS,
-    planner::{Position, TimedAction},
+    pace::Pace,
+    planner::Position,
 };
 
-/// How much motion is planned and sent ahead of the board's clock.
-pub(super) const HORIZON: Seconds = Seconds(4.0);
 /// With less than this ahead and no more G-code at hand, the machine is brought to rest on what there is.
 pub(super) const STARVED: Seconds = Seconds(1.0);
 /// A motor's lane that has less room than this takes no more: one command of the planner's is at most three messages.
@@ -36,56 +35,6 @@ const TIMELINE_MAX: usize = 16_384;
 const ENABLE_LEAD: Seconds = Seconds(0.02);
 /// After its last step a run counts as ended only this much later: the board's clock is an estimate.
 const SETTLE: Seconds = Seconds(0.02);
-
-/// Something that happens when the board's clock gets there.
-#[derive(Clone, Debug)]
-pub(super) enum Due {
-    /// The machine gets to the end of a move.
-    MoveEnd(ScheduledMove),
-    /// A line's action.
-    Action(LineNumber, TimedAction),
-}
-
-/// A run of motion on the board's clock.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
-    pub(super) start: Ticks,
-    /// Known once its last move has been planned.
-    pub(super) end: Option<Ticks>,
-    /// Whether it belongs to homing, which is no print time.
-    pub(super) homing: bool,
-}
-
-/// A run that was begun by a host that is gone.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct TakenUp {
-    pub(super) start: Ticks,
-    pub(super) end: Option<Ticks>,
-    /// Where the board counts each motor to be.
-    pub(super) counts: [i32; MOTORS],
-    /// The same at the start of the run, and the machine's position there.
-    pub(super) counts_at_start: [i32; MOTORS],
-    pub(super) position_at_start: Position,
-    /// Print time of the runs before.
-    pub(super) elapsed: Seconds,
-}
-
-/// A run of motion that was put aside at rest on its path.
-#[derive(Debug)]
-pub(super) struct Cut {
-    pub(super) run: Run,
-    /// The motion clock of that rest.
-    pub(super) at: Ticks,
-    pub(super) left: Left,
-    /// Each motor's direction after the rows that are left.
-    pub(super) forward: [bool; MOTORS],
-    /// Steps that the board has counted in the run.
-    pub(super) made: [i32; MOTORS],
-    pub(super) position_at_start: Position,
-    /// Print time of the runs before.
-    pub(super) elapsed: Seconds,
-    pub(super) timeline: VecDeque<(Ticks, Due)>,
-}
 
 /// What has to be said to a motor before its next steps.
 #[derive(Clone, Copy, Debug, Default)]
@@ -151,7 +100,7 @@ impl MotionStream {
             && self
                 .run
                 .zip(generated_until)
-                .is_none_or(|(run, until)| run.start + until < clock_now + board.ticks(HORIZON))
+                .is_none_or(|(run, until)| run.start + until < clock_now + board.horizon())
     }
 
     /// Whether the motion planned so far ends soon.
@@ -185,7 +134,7 @@ impl MotionStream {
         }
         self.enabled[motor] = true;
         let mut clock = board.hardware_of(at, now).saturating_sub(board.ticks(ENABLE_LEAD));
-        if !board.motion.is_steady() {
+        if board.motion.may_rest() {
             // Held where the motor is about to make its first step, which then waits too.
             clock = clock.max(board.output_clock(now));
         }
@@ -399,10 +348,10 @@ impl MotionStream {
         let mut moves = Vec::new();
         for (clock, due) in timeline {
             let due = match due {
-                Due::MoveEnd(mv) => {
+                Due::MoveEnd(mv, pace) => {
                     let mv = mv.at(later);
                     moves.push(mv);
-                    Due::MoveEnd(mv)
+                    Due::MoveEnd(mv, pace)
                 }
                 due @ Due::Action(..) => due,
             };
@@ -419,6 +368,19 @@ impl MotionStream {
     /// The next thing whose clock has come.
     pub(super) fn pop_due(&mut self, clock_now: Ticks) -> Option<Due> {
         self.timeline.pop_front_if(|(at, _)| *at <= clock_now).map(|(_, due)| due)
+    }
+
+    /// The pace of the move that is being made, or comes next; nothing behind the last that is planned.
+    pub(super) fn pace(&self) -> Option<Pace> {
+        self.timeline.iter().find_map(|(_, due)| match due {
+            Due::MoveEnd(_, pace) => Some(*pace),
+            Due::Action(..) => None,
+        })
+    }
+
+    /// Whether the nozzle is on once all that has been planned has been made.
+    pub(super) fn leaves_hot(&self, is_hot: bool) -> bool {
+        leaves_hot(&self.timeline, is_hot)
     }
 
     /// The run's last move has been planned; it ends at this clock.

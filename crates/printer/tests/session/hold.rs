@@ -214,7 +214,7 @@ fn a_stall_where_nothing_is_leased_ends_as_it_would_without() {
     let mut bench = slow.ready();
     bench.start(&format!("G28\nG1 X20 F6000\n{END}"));
     bench.until("homing", 10.0, |bench| bench.pulses().len() > 100);
-    stall(&mut bench, 1.0);
+    stall(&mut bench, 2.5);
     bench.job_over();
     assert_eq!((bench.error().code, holds(&bench)), (ErrorCode::HomingTimeout, vec![]));
     // In a pause, and while it is heated.
@@ -372,5 +372,28 @@ fn stalls_at_random_moments_leave_the_same_pulses() {
             assert!(printed(&mut bench, from) == expected, "seed {seed} on {}", setup.board.name);
         }
         assert!(count > 5, "{count} holds");
+    }
+}
+
+#[test]
+fn a_host_that_is_held_up_once_more_right_after_the_word_goes_on() {
+    let setup = crate::attach::setup(BoardProfile::rp2040());
+    let file = crate::attach::file();
+    for request in [Request::Resume, Request::Cancel] {
+        let (mut bench, _) = crate::attach::started(&setup, &file);
+        bench.run(3.0);
+        crate::attach::die(&mut bench, &setup, 1.0);
+        crate::attach::take_up(&mut bench, &file);
+        bench.ask(request.clone());
+        let now = bench.now();
+        bench.session.poll(now, &mut Vec::new());
+        stall(&mut bench, 8.0);
+        bench.run(1.0);
+        if bench.session.job_status() == JobStatus::Held {
+            bench.ask(request);
+        }
+        bench.job_over();
+        assert_eq!(bench.errors(), []);
+        assert_eq!(bench.session.phase(), PhaseName::Ready);
     }
 }

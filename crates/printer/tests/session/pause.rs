@@ -25,7 +25,7 @@ const LATENCY_MAX: f64 = 0.2;
 pub(crate) type Step = (usize, u64, usize, bool);
 
 /// The motion clocks at which runs were cut off in a pause; homing breaks runs off too.
-fn cuts(bench: &Bench) -> Vec<u64> {
+pub(crate) fn cuts(bench: &Bench) -> Vec<u64> {
     let homed = bench.events.iter().rposition(|event| matches!(event, Event::Homed { .. }));
     let cut = |event: &Event| match event {
         Event::RunBroken { at } => Some(at.0),
@@ -77,20 +77,25 @@ fn print_steps(bench: &Bench, from: usize) -> Vec<Step> {
 }
 
 /// Each motor's steps in their order, without those from one place to another.
-fn steps_of(bench: &Bench, from: usize, without: Option<(usize, usize)>) -> Vec<Vec<bool>> {
-    let is_own = |index: usize| without.is_none_or(|(begin, end)| !(begin..end).contains(&index));
+pub(crate) fn steps_of(bench: &Bench, from: usize, without: Option<(usize, usize)>) -> Vec<Vec<bool>> {
+    steps_without(bench, from, without.as_slice())
+}
+
+/// The same, from several places to others.
+pub(crate) fn steps_without(bench: &Bench, from: usize, without: &[(usize, usize)]) -> Vec<Vec<bool>> {
+    let is_own = |index: usize| without.iter().all(|(begin, end)| !(*begin..*end).contains(&index));
     let pulses = bench.pulses().iter().enumerate().skip(from).filter(|(index, _)| is_own(*index));
     let pulses: Vec<_> = pulses.map(|(_, pulse)| *pulse).collect();
     let of = |motor: usize| pulses.iter().filter(move |pulse| pulse.1 == motor).map(|pulse| pulse.2);
     (0..4).map(|motor| of(motor).collect()).collect()
 }
 
-fn random(seed: u64) -> impl FnMut(f64, f64) -> f64 {
+pub(crate) fn random(seed: u64) -> impl FnMut(f64, f64) -> f64 {
     let mut random = Pcg32::new(seed, 17);
     move |low, high| low + (high - low) * f64::from(random.next_u32()) / f64::from(u32::MAX)
 }
 
-fn is_over(bench: &Bench) -> bool {
+pub(crate) fn is_over(bench: &Bench) -> bool {
     bench.session.job_status() == JobStatus::None
 }
 
@@ -114,7 +119,7 @@ pub(crate) fn pause(bench: &mut Bench) -> Option<f64> {
 }
 
 #[track_caller]
-fn resume(bench: &mut Bench) {
+pub(crate) fn resume(bench: &mut Bench) {
     bench.ask(Request::Resume);
     let resumed = |event: &&Event| matches!(event, Event::RunResumed { .. });
     let wanted = cuts(bench).len();

@@ -67,7 +67,7 @@ pub(super) fn plan(text: &str, drive: Drive) -> anyhow::Result<Plan> {
     loop {
         match planner.next(&mut source).map_err(|error| anyhow!("{error}"))? {
             Planned::Steps(command) => plan.take(&command, &mut forward),
-            Planned::Move(planned) => plan.judge(&planned),
+            Planned::Move(planned, _) => plan.judge(&planned),
             Planned::RunEnded(at) => {
                 plan.time_s = at.0;
                 plan.end = CLOCK.ticks_in(at).0 + SETTLE_TICKS;

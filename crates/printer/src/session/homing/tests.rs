@@ -28,7 +28,7 @@ impl Table {
 
     fn position(&mut self, steps: i32) -> Result<(), PrinterError> {
         assert_eq!(self.poll(true), Ok(Wish::Wait));
-        self.homing.on_position(self.homing.stepper, steps)
+        self.homing.on_position(self.homing.stepper, steps, self.now)
     }
 
     fn trigger(&mut self, can_trigger: bool, reason: u8) -> Result<(), PrinterError> {
@@ -54,6 +54,23 @@ impl Table {
         self.trigger(false, REASON_ENDSTOP)?;
         assert_eq!(self.poll(false), Ok(Wish::Abandon));
         self.position(steps)
+    }
+
+    /// The board stops here, for it has heard nothing.
+    fn expired(&mut self, steps: i32) {
+        self.trigger(false, REASON_EXPIRED).unwrap();
+        assert_eq!(self.poll(false), Ok(Wish::Abandon));
+        self.position(steps).unwrap();
+    }
+
+    /// To the middle of an approach that goes on.
+    fn go_on(&mut self) -> HomingMove {
+        assert_eq!(self.poll(true), Ok(Wish::GoesOn));
+        let Ok(Wish::Move(wanted)) = self.poll(true) else { panic!() };
+        let start = self.board.clock_at(self.now);
+        self.homing.run_started(start, &mut self.board, self.now);
+        assert_eq!(self.poll(false), Ok(Wish::Wait));
+        wanted
     }
 
     fn back_off(&mut self) -> HomingMove {
@@ -108,15 +125,91 @@ fn a_switch_that_stays_closed_or_closes_without_a_step_is_none() {
 
 #[test]
 fn why_an_approach_ended_decides() {
-    for (reason, code) in [
-        (REASON_HOST, ErrorCode::EndstopNotReached),
-        (REASON_EXPIRED, ErrorCode::HomingTimeout),
-        (99, ErrorCode::EndstopNotReached),
-    ] {
+    for reason in [REASON_HOST, 99] {
         let mut table = Table::new("5");
         table.approach(0);
         table.trigger(true, 0).unwrap();
-        assert_eq!(table.trigger(false, reason).unwrap_err().code, code);
+        assert_eq!(table.trigger(false, reason).unwrap_err().code, ErrorCode::EndstopNotReached);
+    }
+}
+
+#[test]
+fn an_approach_that_the_time_out_ends_goes_on_from_there() {
+    let mut table = Table::new("5");
+    assert_eq!(table.approach(100).from_mm, 450.0);
+    table.expired(-3100);
+    // What was made, at 80 steps a mm, is not made again.
+    let second_try = table.go_on();
+    assert_eq!((second_try.from_mm, second_try.to_mm, second_try.speed.0), (410.0, 0.0, 50.0));
+    table.found(-3900).unwrap();
+    table.back_off();
+    table.endstop(false, false).unwrap();
+    assert_eq!(table.approach(-3500).from_mm, 10.0);
+    table.expired(-3740);
+    let slow = table.go_on();
+    assert_eq!((slow.from_mm, slow.to_mm, slow.speed.0), (7.0, 0.0, 10.0));
+    // The switch is closed without a further step, but there were some.
+    table.found(-3740).unwrap();
+    assert_eq!((table.poll(true), table.homing.steps), (Ok(Wish::Done), 4000 + 240));
+}
+
+#[test]
+fn an_approach_is_begun_a_few_times_and_goes_no_further_than_one() {
+    let mut table = Table::new("5");
+    table.approach(0);
+    for tries in 1..TRIES_MAX {
+        table.expired(-i32::from(tries));
+        table.go_on();
+    }
+    assert_eq!(table.trigger(false, REASON_EXPIRED).unwrap_err().code, ErrorCode::HomingTimeout);
+
+    let mut table = Table::new("5");
+    table.approach(0);
+    table.trigger(false, REASON_EXPIRED).unwrap();
+    assert_eq!(table.poll(false), Ok(Wish::Abandon));
+    assert_eq!(table.position(-36_000).unwrap_err().code, ErrorCode::EndstopNotReached);
+}
+
+#[test]
+fn what_was_apart_for_long_does_not_go_on() {
+    for is_called in [false, true] {
+        let mut table = Table::new("5");
+        table.approach(0);
+        table.trigger(true, 0).unwrap();
+        while is_called && table.now < Seconds(2.1) {
+            table.now += Seconds(0.1);
+            assert_eq!(table.poll(false), Ok(Wish::Wait));
+        }
+        table.now = Seconds(2.1);
+        // What had been on the way all that time comes in one go.
+        table.trigger(true, 0).unwrap();
+        assert_eq!(table.trigger(false, REASON_EXPIRED).unwrap_err().code, ErrorCode::HomingTimeout);
+    }
+
+    // Nor does it when the answer where the motor stands took so long.
+    let mut table = Table::new("5");
+    table.approach(0);
+    table.trigger(false, REASON_EXPIRED).unwrap();
+    assert_eq!(table.poll(false), Ok(Wish::Abandon));
+    assert_eq!(table.poll(true), Ok(Wish::Wait));
+    table.now = Seconds(2.1);
+    assert_eq!(table.position(-10).unwrap_err().code, ErrorCode::HomingTimeout);
+}
+
+#[test]
+fn an_approach_that_is_to_go_on_can_be_cancelled() {
+    for polls in 0..3 {
+        let mut table = Table::new("5");
+        table.approach(0);
+        table.trigger(false, REASON_EXPIRED).unwrap();
+        for _ in 0..polls {
+            table.poll(true).unwrap();
+        }
+        table.homing.cancel();
+        if polls == 0 {
+            assert_eq!(table.poll(true), Ok(Wish::Abandon));
+        }
+        assert_eq!(table.poll(true), Ok(Wish::Cancelled));
     }
 }
 
@@ -128,8 +221,8 @@ fn answers_for_others_and_at_other_times_change_nothing() {
     table.approach(0);
     table.homing.on_trigger(77, false, REASON_ENDSTOP, table.now, &mut table.board).unwrap();
     table.homing.on_endstop(77, false, true, table.now, &mut table.board).unwrap();
-    table.homing.on_position(77, 5).unwrap();
-    table.homing.on_position(table.homing.stepper, 5).unwrap();
+    table.homing.on_position(77, 5, table.now).unwrap();
+    table.homing.on_position(table.homing.stepper, 5, table.now).unwrap();
     assert!(matches!(table.homing.stage, Stage::Approach { .. }));
 }
 

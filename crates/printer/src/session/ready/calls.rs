@@ -8,7 +8,7 @@ const GAP_MIN: Seconds = Seconds(0.5);
 /// A run that was planned before one so long does not begin after it unasked.
 const GAP_BEGIN_MAX: Seconds = Seconds(1.0);
 /// After one so long, what was not heard of meanwhile is not silence.
-const GAP_LONG: Seconds = Seconds(3.0);
+pub(super) const GAP_LONG: Seconds = Seconds(3.0);
 
 /// When the session was last called, and the longest pause since then that it has noticed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,12 +20,12 @@ pub(super) struct Calls {
 }
 
 impl Calls {
-    /// Notes a call. Whether it comes after a long pause.
-    pub(super) fn note(&mut self, now: Seconds) -> bool {
+    /// Notes a call; the pause before it, where it was one.
+    pub(super) fn note(&mut self, now: Seconds) -> Option<Seconds> {
         let gap = self.last.replace(now).map(|last| now - last).filter(|&gap| gap >= GAP_MIN);
         self.gap = gap.or(self.gap);
         self.longest = gap.map_or(self.longest, |gap| gap.max(self.longest));
-        gap.is_some_and(|gap| gap >= GAP_LONG)
+        gap
     }
 
     /// A run of motion has been planned.

@@ -38,7 +38,7 @@ impl Ready {
                 hold.purpose = purpose;
                 hold.asked = now;
             }
-            self.tell_hold(purpose);
+            self.tell_hold(purpose, now);
             return true;
         };
         let mut is_at_rest = false;
@@ -51,7 +51,7 @@ impl Ready {
                 hold.phase = Phase::Slowing;
                 hold.asked = now;
                 hold.turned = Some(Turned { told, sent: None });
-                self.tell_hold(purpose);
+                self.tell_hold(purpose, now);
             }
             Phase::AtRest | Phase::Heating | Phase::Resuming(None) => {
                 is_at_rest = true;
@@ -67,11 +67,11 @@ impl Ready {
     }
 
     /// Tells the board to hold.
-    pub(super) fn tell_hold(&mut self, purpose: Purpose) {
+    pub(super) fn tell_hold(&mut self, purpose: Purpose, now: Seconds) {
         // On the way back everything is at rest already.
         let ramp = if purpose == Purpose::GoOn { RAMP_AT_REST } else { self.lease.ramp() };
-        let ramp = self.board.ticks(ramp).0 as u32;
-        self.board.control(&Command::MotionHold { ramp });
+        let ramp = self.board.ticks(ramp);
+        self.board.hold_motion(ramp, now);
     }
 
     /// Whether nothing is to be planned: what was planned comes to rest on its path, or has been dropped.
@@ -157,6 +157,15 @@ impl Ready {
             job.state = JobState::Cancelling;
         }
         true
+    }
+
+    /// This host was held up for so long: what it has asked had no time to be answered.
+    pub(super) fn has_not_listened(&mut self, gap: Seconds) {
+        if let Some(Phase::Rejoining { since, .. } | Phase::Dropping { since, .. }) =
+            self.hold.as_mut().map(|hold| &mut hold.phase)
+        {
+            *since += gap;
+        }
     }
 
     /// A motor's answer to a dropped queue.

@@ -138,9 +138,7 @@ impl Ready {
     pub(super) fn on_motion(&mut self, report: &MotionReport, now: Seconds) {
         let Some(clock) = self.board.on_motion(report, now) else { return };
         if report.state == MotionState::Running {
-            if self.board.motion.is_steady() {
-                self.hold_is_over(now);
-            }
+            self.hold_is_over(now);
             return;
         }
         let at_rest = report.state == MotionState::Held;
@@ -224,7 +222,7 @@ impl Ready {
         });
     }
 
-    /// Motion goes at its full rate.
+    /// Motion goes at its rate.
     fn hold_is_over(&mut self, now: Seconds) {
         let is_over = |hold: &mut Hold| {
             hold.rest.is_none() && !hold.is_wanted() && !matches!(hold.phase, Phase::Dropping { .. })
@@ -347,7 +345,7 @@ impl Ready {
                     }
                     if now - hold.asked >= ASK_AGAIN {
                         hold.asked = now;
-                        self.tell_hold(hold.purpose);
+                        self.tell_hold(hold.purpose, now);
                     }
                 }
             }
@@ -394,8 +392,9 @@ impl Ready {
             Phase::Resuming(told @ None) => {
                 if let Some(cover) = self.cover_to_resume(now) {
                     self.lease.tell(cover, &mut self.board, now);
-                    let ramp = self.board.ticks(self.lease.ramp()).0 as u32;
-                    self.board.control(&Command::MotionResume { ramp });
+                    self.keep_rate(now);
+                    let ramp = self.board.ticks(self.lease.ramp());
+                    self.board.resume_motion(ramp, now);
                     *told = Some(self.board.clock_at(now));
                 }
             }
@@ -428,7 +427,8 @@ impl Ready {
             Phase::Leaving { asked } => {
                 if now - *asked >= ASK_AGAIN {
                     *asked = now;
-                    self.board.control(&Command::MotionResume { ramp: 0 });
+                    self.keep_rate(now);
+                    self.board.resume_motion(Ticks(0), now);
                 }
             }
         }

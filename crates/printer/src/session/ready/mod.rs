@@ -9,6 +9,7 @@ mod ending;
 mod hold;
 mod pause;
 mod plan;
+mod rate;
 mod start;
 mod take_up;
 mod take_up_parked;
@@ -18,8 +19,9 @@ use gcode::LineNumber;
 use units::Seconds;
 
 use self::{
-    calls::Calls,
+    calls::{Calls, GAP_LONG},
     hold::Hold,
+    rate::Rate,
     waiting::{Held, Wait},
 };
 use super::{
@@ -47,6 +49,8 @@ use crate::{
 const PUMP_INTERVAL: Seconds = Seconds(0.05);
 /// While lines are passed over, the owner is asked for more of the file this often.
 const SKIP_INTERVAL: Seconds = Seconds(0.002);
+/// So far ahead the board has the fan's changes: more than what it moves on its own once it is left alone.
+const FAN_AHEAD: Seconds = Seconds(3.0);
 /// How often a machine at rest looks after itself.
 const IDLE_INTERVAL: Seconds = Seconds(0.25);
 /// Motion that is due this long ago and has not been sent is none that the board could make.
@@ -84,6 +88,7 @@ pub(super) struct Ready {
     /// When the last run of motion came to its end, by this host's clock.
     rested: Seconds,
     lease: Lease,
+    rate: Rate,
     /// Motion is held.
     hold: Option<Hold>,
     /// The board has lowered its heaters, which has not been dealt with.
@@ -119,6 +124,7 @@ impl Ready {
             last_active: now,
             rested: Seconds(f64::NEG_INFINITY),
             lease,
+            rate: Rate::new(),
             hold: None,
             have_heaters_fallen: false,
             calls: Calls::default(),
@@ -135,7 +141,7 @@ impl Ready {
     pub(super) fn motion_queued(&self, now: Seconds) -> Option<Seconds> {
         let motion_now = self.board.motion_at(now);
         let run = self.stream.run()?;
-        if run.homing || run.end.is_some() || motion_now < run.start || !self.board.motion.is_steady() {
+        if run.homing || run.end.is_some() || motion_now < run.start || !self.board.motion.is_running() {
             return None;
         }
         let covered = self.stream.covered(self.planner.generated_until(), &self.board)?;
@@ -159,7 +165,9 @@ impl Ready {
 
     /// What came during a long pause has waited: it tells nothing of now.
     fn note_call(&mut self, now: Seconds) {
-        if self.calls.note(now) {
+        let Some(gap) = self.calls.note(now) else { return };
+        self.has_not_listened(gap);
+        if gap >= GAP_LONG {
             self.thermal.listens_again(now);
         }
     }
@@ -228,7 +236,7 @@ impl Ready {
         }
         let Wait::Homing { axis, .. } = &mut self.wait else { return };
         let result = match message {
-            Message::Position { oid, position } => axis.on_position(oid, position),
+            Message::Position { oid, position } => axis.on_position(oid, position, now),
             Message::Endstop { oid, homing, pin_value } => {
                 axis.on_endstop(oid, homing, pin_value, now, &mut self.board)
             }
@@ -284,10 +292,11 @@ impl Ready {
             return self.advance_hold(now);
         }
         let motion_now = self.board.motion_at(now);
-        self.stream.forget_made(motion_now, &self.board);
         if !self.plans_nothing() {
+            self.give_fan_orders(now);
             self.stream.send_again(&mut self.board, now);
         }
+        self.stream.forget_made(motion_now, &self.board);
         while let Some(due) = self.stream.pop_due(motion_now) {
             self.on_due(due, now);
         }
@@ -303,13 +312,22 @@ impl Ready {
         self.diary.tell_progress(now);
         self.pump(now)?;
         self.renew_lease(now);
+        self.keep_rate(now);
         self.rest(now);
         Ok(())
     }
 
+    /// The board gets changes of the fan's speed as late as is safe: what the user sets comes behind those that it has.
+    fn give_fan_orders(&mut self, now: Seconds) {
+        let until = self.board.motion_at(now) + self.board.ticks(FAN_AHEAD);
+        while let Some((at, speed)) = self.stream.kept.next_fan(until) {
+            self.thermal.set_fan(speed, Some(at), &mut self.board, now);
+        }
+    }
+
     fn on_due(&mut self, due: Due, now: Seconds) {
         match due {
-            Due::MoveEnd(made) => {
+            Due::MoveEnd(made, _) => {
                 let elapsed = self.stream.elapsed(made.end, &self.board);
                 if made.line > 0 && self.plans_job() {
                     self.diary.progress(Progress { line: made.line, elapsed, z: made.to[2] });

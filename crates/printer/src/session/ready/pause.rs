@@ -155,7 +155,7 @@ impl Ready {
         let Some(cut) = paused.cut.take() else { return };
         let Cut { at: broken, .. } = *cut;
         let at = self.board.motion_at(now);
-        let (from, fans) = (cut.left.from, cut.left.fans.clone());
+        let from = cut.left.from;
         self.planner = *paused.planner;
         let (run, moves) = self.stream.rejoin(*cut, at, &self.board);
         if let Some(job) = &mut self.job {
@@ -166,10 +166,6 @@ impl Ready {
         self.stream.send_again(&mut self.board, now);
         let fan = self.thermal.fan_speed();
         self.stream.kept.set_fan(fan);
-        for (clock, speed) in fans {
-            let clock = units::Ticks((clock.0 + at.0).saturating_sub(broken.0));
-            self.thermal.set_fan(speed, Some(clock), &mut self.board, now);
-        }
         self.events.push(Event::RunResumed { broken, at });
         for mv in moves {
             self.events.push(Event::Move(mv));

@@ -8,7 +8,7 @@ use super::{Failure, Ready, Wait};
 use crate::{
     error::{ErrorCode, PrinterError},
     journal::{Input, MovedBy},
-    planner::{Barrier, ExtrusionPermit, Planned, TimedAction},
+    planner::{Barrier, ExtrusionPermit, Pace, Planned, TimedAction},
     session::{
         event::{Event, ScheduledMove, SpeedProfile},
         job::{Job, JobState},
@@ -120,9 +120,9 @@ impl Ready {
                 }
                 self.events.push(Event::RunStarted { at: run.start, position });
             }
-            Planned::Move(planned) => {
+            Planned::Move(planned, pace) => {
                 let Some(run) = self.stream.run() else { return Ok(true) };
-                self.schedule_move(&planned, run);
+                self.schedule_move(&planned, pace, run);
             }
             Planned::Steps(command) => self.stream.push(&command, &mut self.board, now),
             Planned::Timed { at, line, action } => self.on_timed(at, line, action, now),
@@ -149,9 +149,9 @@ impl Ready {
     }
 
     /// A move has its place on the motion clock.
-    pub(super) fn schedule_move(&mut self, planned: &PlannedMove, run: Run) {
+    pub(super) fn schedule_move(&mut self, planned: &PlannedMove, pace: Pace, run: Run) {
         let scheduled = self.scheduled(planned, run);
-        self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled));
+        self.stream.schedule(scheduled.end, Due::MoveEnd(scheduled, pace));
         self.events.push(Event::Move(scheduled));
     }
 
@@ -184,7 +184,7 @@ impl Ready {
     fn note(&mut self, planned: &Planned) {
         let Some(job) = self.active_job() else { return };
         let target = match planned {
-            Planned::Move(planned) => {
+            Planned::Move(planned, _) => {
                 job.has_moved |= planned.tag > 0;
                 return;
             }
@@ -210,13 +210,12 @@ impl Ready {
         }
         let clock = run.start + self.board.ticks(at);
         match action {
-            // The board itself does it at that clock.
+            // The board itself does it at that clock, once it is near.
             TimedAction::Fan { speed, .. } => {
                 self.stream.kept.push_fan(clock, speed);
                 if !self.plans_job() {
                     self.diary.input(Input::Fan(speed));
                 }
-                self.thermal.set_fan(speed, Some(clock), &mut self.board, now);
             }
             action => self.stream.schedule(clock, Due::Action(line, action)),
         }

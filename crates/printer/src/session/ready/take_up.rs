@@ -6,9 +6,8 @@
 use std::collections::VecDeque;
 
 use units::{Celsius, Seconds, Ticks};
-use wire::Command;
 
-use super::Ready;
+use super::{Ready, rate::Rate};
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
@@ -76,7 +75,7 @@ impl Ready {
         let mut ready = Self::with_planner(config, board, taken.planner, now);
         let counts = queue.motors.map(|motor| motor.position);
         let made = |motor: usize| if inverted[motor] { -taken.made[motor] } else { taken.made[motor] };
-        ready.diary = diary;
+        (ready.diary, ready.rate) = (diary, Rate::unknown());
         let run = ready.stream.take_up(&TakenUp {
             start,
             end: taken.end.map(|end| start + end),
@@ -89,7 +88,7 @@ impl Ready {
         for (at, due) in taken.timeline {
             let at = start + at;
             match due {
-                TimedDue::Move(planned) if at > motion_now => ready.schedule_move(&planned, run),
+                TimedDue::Move(planned, pace) if at > motion_now => ready.schedule_move(&planned, pace, run),
                 TimedDue::Action(_, TimedAction::Fan { speed, .. }) if at > motion_now => {
                     rest.fans.push((at, speed));
                 }
@@ -97,14 +96,14 @@ impl Ready {
                     ready.stream.schedule(at, Due::Action(line, action));
                 }
                 TimedDue::Action(_, action) => rest.pass(&action),
-                TimedDue::Move(_) => {}
+                TimedDue::Move(..) => {}
             }
         }
         taken.adopted.iter().for_each(|&input| rest.adopt(input));
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
         job.source = taken.source;
         job.has_moved = true;
-        job.leaves_hot = rest.is_nozzle_on();
+        job.leaves_hot = ready.stream.leaves_hot(rest.is_nozzle_on());
         job.told = now;
         ready.job = Some(job);
         ready.hold_for_host(rest);
@@ -120,7 +119,6 @@ impl Ready {
         self.thermal.set_fan(rest.fan, None, &mut self.board, now);
         for &(at, speed) in &rest.fans {
             self.stream.kept.push_fan(at, speed);
-            self.thermal.set_fan(speed, Some(at), &mut self.board, now);
         }
     }
 }
@@ -180,8 +178,8 @@ impl Rest {
     pub(super) fn stop(&mut self, ramp: Seconds, board: &mut Board, now: Seconds) {
         if now - self.asked >= ASK_AGAIN && !board.motion.is_held() {
             self.asked = now;
-            let ramp = board.ticks(ramp).0 as u32;
-            board.control(&Command::MotionHold { ramp });
+            let ramp = board.ticks(ramp);
+            board.hold_motion(ramp, now);
         }
     }
 }

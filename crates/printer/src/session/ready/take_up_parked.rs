@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use units::{Clock32, Seconds, Ticks};
 
-use super::{Ready, hold::Purpose, take_up::Rest};
+use super::{Ready, hold::Purpose, rate::Rate, take_up::Rest};
 use crate::{
     config::PrinterConfig,
     error::PrinterError,
@@ -17,7 +17,7 @@ use crate::{
         diary::Diary,
         job::{Job, JobOptions, JobState, Paused, Retracted},
         kept::Left,
-        stream::{Cut, Due, Run},
+        stream::{Cut, Due, Run, leaves_hot},
     },
 };
 
@@ -51,7 +51,7 @@ impl Ready {
         let mut diary = Diary::default();
         diary.take_up(&taken, now);
         let mut ready = Self::with_planner(config, board, planner, now);
-        ready.diary = diary;
+        (ready.diary, ready.rate) = (diary, Rate::unknown());
         ready.planner.stand_at(here);
         let homed = taken.planner.guard.homed();
         (0..3).for_each(|axis| ready.planner.guard.set_homed(axis, homed[axis]));
@@ -70,8 +70,8 @@ impl Ready {
         };
         for (at, due) in taken.timeline {
             match due {
-                TimedDue::Move(planned) if at > cut.at => {
-                    cut.timeline.push_back((at, Due::MoveEnd(ready.scheduled(&planned, run))));
+                TimedDue::Move(planned, pace) if at > cut.at => {
+                    cut.timeline.push_back((at, Due::MoveEnd(ready.scheduled(&planned, run), pace)));
                 }
                 TimedDue::Action(_, TimedAction::Fan { speed, .. }) if at > cut.at => {
                     cut.left.fans.push_back((at, speed));
@@ -80,16 +80,17 @@ impl Ready {
                     cut.timeline.push_back((at, Due::Action(line, action)));
                 }
                 TimedDue::Action(_, action) => rest.pass(&action),
-                TimedDue::Move(_) => {}
+                TimedDue::Move(..) => {}
             }
         }
         taken.adopted.iter().for_each(|&input| rest.adopt(input));
         cut.left.fan = rest.fan();
+        let leaves_hot = leaves_hot(&cut.timeline, rest.is_nozzle_on());
         let could_extrude = rest.is_nozzle_on() || parked.retract > 0.0;
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
         job.source = taken.source;
         job.has_moved = true;
-        job.leaves_hot = rest.is_nozzle_on();
+        job.leaves_hot = leaves_hot;
         job.told = now;
         job.state = JobState::Halting;
         job.paused = Some(Paused {

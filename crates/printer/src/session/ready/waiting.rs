@@ -182,6 +182,10 @@ impl Ready {
                 self.break_run(now);
                 self.planner.set_axis(axis, position_mm, false);
             }
+            Ok(Wish::GoesOn) => {
+                let text = "homing was stopped by the board, which heard nothing for a moment: it goes on from there";
+                self.events.push(Event::Message(text.into()));
+            }
             Ok(Wish::Done) => {
                 let (position_mm, steps) = (homing.position_mm(), homing.steps);
                 self.planner.set_axis(axis, position_mm, true);
