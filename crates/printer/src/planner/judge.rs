@@ -1,0 +1,90 @@
+//! What a move may do, before it is planned: where it may go, how fast its motors can make it, and what the user is told.
+
+use gcode::{Diagnostic, DiagnosticCode, LineNumber, Move, Severity, VelocityLimit};
+use units::MmPerS;
+
+use super::{Planned, Planner, Position, Source};
+use crate::{
+    config::UnreachableSpeed,
+    error::{ErrorCode, PrinterError},
+    machine,
+};
+
+impl Planner {
+    pub(super) fn notice_fan(&mut self, line: LineNumber) {
+        if !core::mem::replace(&mut self.said.other_fans, true) {
+            self.notice(line, "the machine file has one fan: orders for others are passed over");
+        }
+    }
+
+    pub(super) fn notice(&mut self, line: LineNumber, message: &str) {
+        self.ready.push_back(Planned::Notice(Diagnostic {
+            line,
+            columns: 0..0,
+            severity: Severity::Info,
+            code: DiagnosticCode::IgnoredSetting,
+            message: message.into(),
+        }));
+    }
+
+    /// A file may ask for less speed and acceleration than the machine file allows, never for more.
+    pub(super) fn limit(&mut self, limit: VelocityLimit) {
+        let limits = machine::lowered(&self.machine_limits, &self.limits, &limit);
+        // Limits that make no sense (zero, not a number) leave those that hold.
+        if self.look_ahead.set_limits(limits).is_ok() {
+            self.limits = limits;
+        }
+    }
+
+    pub(super) fn judge_and_push(&mut self, mv: &Move, source: &Source) -> Result<(), PrinterError> {
+        let e_offset = source.e_offset;
+        let to = [mv.to.x, mv.to.y, mv.to.z, mv.to.e + e_offset];
+        // Judged from where the machine is, not from where the source believes that it is.
+        let [x, y, z, e] = self.position;
+        let from = gcode::Position { x, y, z, e: e - e_offset };
+        self.guard.judge(&Move { from, ..*mv })?;
+        let feed = self.feed(mv, to, source);
+        self.judge_torque(to, feed, mv.line)?;
+        self.push(to, feed, mv.line, source.pace())
+    }
+
+    /// A move's feed; one that a factor has made faster than the motors can follow is slowed down to what they can.
+    pub(super) fn feed(&mut self, mv: &Move, to: Position, source: &Source) -> MmPerS {
+        if source.interpreter.speed_factor() <= 1.0 && source.interpreter.flow_factor() <= 1.0 {
+            return mv.feed;
+        }
+        let feed = self.step_rates.slowed(self.position, to, mv.feed);
+        if feed < mv.feed && !core::mem::replace(&mut self.said.slowed, true) {
+            self.notice(mv.line, "a move is made slower than the factor asks: a motor cannot step faster");
+        }
+        feed
+    }
+
+    /// A move that is faster than its motors' torque allows is slowed down by the look-ahead: the user is told, or it is
+    /// refused, as the machine file says.
+    pub(super) fn judge_torque(
+        &mut self,
+        to: Position,
+        feed: MmPerS,
+        line: LineNumber,
+    ) -> Result<(), PrinterError> {
+        if to == self.position || self.said.clamped {
+            return Ok(());
+        }
+        let found = self.step_rates.out_of_torque(self.position, to, feed, &self.limits);
+        let Some((motor, speed, top)) = found else { return Ok(()) };
+        let name = machine::MOTOR_NAMES[motor];
+        if self.unreachable_speed == UnreachableSpeed::Reject {
+            let detail = format!("{name} at {:.0} mm/s, its torque lasts up to {:.0} mm/s", speed.0, top.0);
+            return Err(PrinterError::new(ErrorCode::StepRateTooHigh, detail).at_line(line.0));
+        }
+        self.said.clamped = true;
+        let text = format!(
+            "moves are made slower than the file asks: {name} would have to go {:.0} mm/s, and its torque lasts up to \
+             {:.0} mm/s",
+            speed.0, top.0
+        );
+        self.notice(line, &text);
+        Ok(())
+    }
+}
