@@ -17,7 +17,7 @@ const MOVES_MAX: usize = 4_000_000;
 /// The longest cell of the grid.
 const CELL_MM_MAX: f64 = 0.1;
 /// A move has this many cells at least …
-const CELLS_MIN: u32 = 4;
+const CELLS_MIN: u32 = 16;
 /// … and at most.
 const CELLS_MAX: u32 = 2_000;
 /// Shorter moves are none.
@@ -183,6 +183,12 @@ impl Bound {
             .fold(way.accel, |accel, (motor, share)| accel.min(motor.exact(speed * share, demand) / share))
     }
 
+    /// The same in the middle of a cell that begins with a squared speed: the midpoint rule.
+    fn mean_accel(&self, way: &Way, v2: f64, cell: f64, demand: Demand) -> f64 {
+        let start = self.accel(way, v2, demand);
+        if self.motors.is_empty() { start } else { self.accel(way, v2 + cell * start, demand) }
+    }
+
     /// Adds the least time from the first move, which starts with what its corner allows, to rest at the end of the last.
     fn solve(&mut self) {
         let Some(last) = self.ways.last() else { return };
@@ -202,7 +208,7 @@ impl Bound {
             for index in (0..count).rev() {
                 point -= 1;
                 let limit = if index == 0 { way.corner_v2 } else { way.cruise_v2 };
-                next = limit.min(next + 2.0 * cell * self.accel(way, next, Demand::Slow));
+                next = limit.min(next + 2.0 * cell * self.mean_accel(way, next, cell, Demand::Slow));
                 speeds[point] = next;
             }
         }

@@ -91,6 +91,9 @@ pub(crate) struct TorqueArgs {
     /// How many machines, whose parts differ by up to 10 %
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) seeds: u32,
+    /// The share of the torque that the plan asks for, instead of the machine file's default
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub(crate) torque_margin: Option<f64>,
     /// Write the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -250,6 +253,10 @@ fn speed(text: &str) -> Result<f64, String> {
 
 fn factor(text: &str) -> Result<f64, String> {
     number(text, "a factor from 0.01 to 100", |value| (0.01..=100.0).contains(&value))
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    number(text, "a share from 0.05 to 1", |value| (0.05..=1.0).contains(&value))
 }
 
 fn jerk(text: &str) -> Result<f64, String> {

@@ -123,7 +123,8 @@ impl Axle {
     }
 
     /// Its section in the machine file.
-    fn section(&self) -> String {
+    fn section(&self, margin: Option<f64>) -> String {
+        let margin = margin.map_or(String::new(), |margin| format!("torque_margin: {margin}\n"));
         let corner = self.corner_rev_s() * f64::from(FULL_STEPS);
         let mut table = format!("0: {0:.3}, {corner:.0}: {0:.3}", self.holding_nm());
         let mut times = 1.0;
@@ -132,7 +133,7 @@ impl Axle {
             let _ = write!(table, ", {:.0}: {:.3}", corner * times, self.holding_nm() / times);
         }
         format!(
-            "\n[motor_torque {}]\npull_out_torque: {table}\ninertia: {:.0}\nload_torque: {}\n",
+            "\n[motor_torque {}]\npull_out_torque: {table}\ninertia: {:.0}\nload_torque: {}\n{margin}",
             self.name,
             self.inertia_kg_m2() * 1e7,
             self.friction_nm
@@ -145,15 +146,15 @@ impl Axle {
 pub(super) enum Drive {
     /// At one acceleration (mm/s²) up to one speed (mm/s).
     Constant { accel: f64, velocity: f64 },
-    /// As the motors' torque allows.
-    Torque,
+    /// As the motors' torque allows, of which a share is asked for.
+    Torque { margin: Option<f64> },
 }
 
 /// The machine file.
 pub(super) fn config(drive: Drive) -> anyhow::Result<PrinterConfig> {
     let (accel, velocity, sections) = match drive {
         Drive::Constant { accel, velocity } => (accel, velocity, String::new()),
-        Drive::Torque => (1e6, 2e3, AXLES.iter().map(Axle::section).collect()),
+        Drive::Torque { margin } => (1e6, 2e3, AXLES.iter().map(|axle| axle.section(margin)).collect()),
     };
     let axis = |name: &str, pins: usize, turn: f64| {
         format!(

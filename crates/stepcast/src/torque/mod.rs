@@ -80,7 +80,7 @@ pub(crate) fn run(args: &TorqueArgs) -> anyhow::Result<ExitCode> {
     }
     drop(progress);
     let constant = best.ok_or_else(|| anyhow::anyhow!("no constant acceleration keeps step"))?;
-    let plan = trial::plan(&text, Drive::Torque)?;
+    let plan = trial::plan(&text, Drive::Torque { margin: args.torque_margin })?;
     let peak = Drive::Constant { accel: plan.accel_max, velocity: plan.velocity_max };
     let report = Report {
         machines: machines.len(),
