@@ -6,7 +6,9 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { type BrowserContext, test as base, expect } from '@playwright/test';
 import { travels } from '../fixtures/gcode.ts';
+import { MainThread } from '../fixtures/main_thread.ts';
 import { pageFolder, type Site, withSite } from '../fixtures/server.ts';
+import { judgeTasks } from '../fixtures/test.ts';
 import { ContextWatch } from '../fixtures/watch.ts';
 import { Panel } from '../pages/panel.ts';
 
@@ -18,14 +20,16 @@ interface Visit {
 }
 
 const test = base.extend<{ visit: Visit }>({
-  visit: async ({ browser }, use) => {
+  visit: async ({ browser }, use, { annotations }) => {
     const folder = await mkdtemp(join(tmpdir(), 'stepcast-offline-'));
     await cp(pageFolder(), folder, { recursive: true });
     await withSite(async (site) => {
       const context = await browser.newContext({ serviceWorkers: 'allow', baseURL: site.url });
       const watch = new ContextWatch(context, [new URL(site.url).origin], site.takeRefusals);
+      const mainThread = MainThread.watch(browser, context, site.url);
       const panel = new Panel(await context.newPage());
       await use({ folder, site, context, panel });
+      await judgeTasks(mainThread, annotations);
       expect(watch.troubles()).toEqual([]);
       await context.close();
     }, folder);

@@ -67,8 +67,8 @@ const JOB_ENDED: &str = "The print has ended: the moves before that place were m
                          and the fan are off.";
 /// The board holds its motion.
 const HELD: &str = "The head rests on its path, no step was lost and the position is known. The board goes \
-                    on watching the heaters; those that it has lowered to stand-by are heated again when you resume. \
-                    Nothing goes on by itself.";
+                    on watching the heaters; those that it has lowered to stand-by are heated again before anything \
+                    goes on, which nothing does by itself.";
 /// Contact is gone, so nothing can be claimed but what the board does by itself.
 const ON_ITS_OWN: &str = "The printer is on its own: after a few seconds without orders its board switches the \
                           heaters off, or keeps them at stand-by for a while and then switches them off. Its motion \

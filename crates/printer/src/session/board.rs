@@ -13,6 +13,7 @@ use crate::{
     clock_sync::ClockSync,
     link::{Clocks, Lane, Link, Outgoing, SCHEDULE_AHEAD_TICKS_MAX},
     machine::MOTORS,
+    pace::RATE_ONE,
 };
 
 /// How far ahead of its clock an output is set on a link that works: several round trips …
@@ -145,6 +146,12 @@ impl Board {
     /// The motion clock at which the part fan changes that is to change "now": the same, where it follows that clock.
     pub(super) fn fan_clock(&self, now: Seconds) -> Ticks {
         self.motion.latest(self.output_clock(now))
+    }
+
+    /// The motion clock in so much time, at the rate that motion has or is about to have.
+    pub(super) fn motion_in(&self, ahead: Seconds, now: Seconds) -> Ticks {
+        let part = self.motion.even_rate().map_or(1.0, |rate| f64::from(rate.get()) / f64::from(RATE_ONE));
+        self.motion_at(now) + self.ticks(ahead * part)
     }
 
     /// The motion clock at which a run of motion that is to start "now" starts.

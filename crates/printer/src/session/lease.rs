@@ -101,6 +101,11 @@ impl Lease {
         self.ramp
     }
 
+    /// How long a board that is left alone may go on before it is at rest, counted at the full rate.
+    pub(super) fn alone_max(&self) -> Seconds {
+        ALIVE + self.ramp * 0.5
+    }
+
     /// Whether the board has a lease.
     pub(super) const fn is_on(&self) -> bool {
         self.told.is_some()

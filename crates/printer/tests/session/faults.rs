@@ -211,3 +211,43 @@ fn an_endstop_that_is_stuck() {
         assert_eq!(bench.session.position().unwrap().1, [false, true, false]);
     }
 }
+
+/// A long way at 20 mm/s in short pieces, and a line that leaves the machine.
+fn long_way_out() -> String {
+    let pieces = "G1 X21 E0.02\nG1 X20 E0.02\n".repeat(150);
+    format!("{START}G1 X20 Y20 F6000\nG1 F1200\n{pieces}G1 X1000\n{END}")
+}
+
+/// Its line.
+fn line_out() -> u32 {
+    let before = long_way_out().lines().take_while(|line| *line != "G1 X1000").count();
+    before as u32 + 1
+}
+
+#[test]
+fn what_was_planned_before_a_bad_line_is_made_hot() {
+    let mut bench = Setup::default().ready();
+    bench.start(&long_way_out());
+    bench.until("the bad line", 200.0, |bench| bench.session.job_status() == JobStatus::Ending);
+    let before = bench.pulses().len();
+    bench.run(2.0);
+    assert!(bench.pulses().len() > before + 1000, "the way goes on");
+    bench.job_over();
+    bench.failed(ErrorCode::MoveOutOfRange, Some(line_out()));
+    // Ten seconds without heat cost more.
+    assert!(bench.celsius(0) > 67.0, "{}", bench.celsius(0));
+    bench.assert_all_off();
+}
+
+#[test]
+fn who_cancels_meanwhile_need_not_wait_for_it() {
+    let mut bench = Setup::default().ready();
+    bench.start(&long_way_out());
+    bench.until("the bad line", 200.0, |bench| bench.session.job_status() == JobStatus::Ending);
+    let since = bench.now();
+    bench.ask(Request::Cancel);
+    bench.job_over();
+    assert!((bench.now() - since).0 < 2.0, "{:?}", bench.now() - since);
+    bench.failed(ErrorCode::MoveOutOfRange, Some(line_out()));
+    bench.assert_all_off();
+}

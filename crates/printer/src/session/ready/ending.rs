@@ -15,7 +15,7 @@ use crate::{
 
 impl Ready {
     /// The G-code that is being carried out cannot go on: a job ends with everything off, the console only forgets
-    /// what else it was told.
+    /// what else it was told. What was planned before that place is made first, as warm as it was to be made.
     pub(in crate::session) fn source_failed(&mut self, error: PrinterError, now: Seconds) {
         self.planner.drop_barrier();
         match &mut self.job {
@@ -23,7 +23,9 @@ impl Ready {
                 if !matches!(job.state, JobState::Failing(_)) {
                     job.state = JobState::Failing(error.ending(Ended::Job));
                     self.stop_waiting();
-                    self.switch_off(now);
+                    if self.is_at_rest() {
+                        self.switch_off(now);
+                    }
                 }
             }
             _ => {
@@ -121,7 +123,8 @@ impl Ready {
         }
         let is_console_busy = self.is_console_busy();
         match &mut self.job {
-            Some(job) if matches!(job.state, JobState::Failing(_)) => return Ok(()),
+            // It ends with its error, but at once.
+            Some(job) if matches!(job.state, JobState::Failing(_)) => {}
             Some(job) => job.state = JobState::Cancelling,
             None if is_console_busy => self.forget_console(),
             None => return Err(ErrorCode::NoJob.into()),

@@ -49,8 +49,8 @@ use crate::{
 const PUMP_INTERVAL: Seconds = Seconds(0.05);
 /// While lines are passed over, the owner is asked for more of the file this often.
 const SKIP_INTERVAL: Seconds = Seconds(0.002);
-/// So far ahead the board has the fan's changes: more than what it moves on its own once it is left alone.
-const FAN_AHEAD: Seconds = Seconds(3.0);
+/// So much more motion ahead than what the board may make once it is left alone, it has the fan's changes.
+const FAN_AHEAD_SPARE: Seconds = Seconds(0.75);
 /// How often a machine at rest looks after itself.
 const IDLE_INTERVAL: Seconds = Seconds(0.25);
 /// Motion that is due this long ago and has not been sent is none that the board could make.
@@ -319,7 +319,8 @@ impl Ready {
 
     /// The board gets changes of the fan's speed as late as is safe: what the user sets comes behind those that it has.
     fn give_fan_orders(&mut self, now: Seconds) {
-        let until = self.board.motion_at(now) + self.board.ticks(FAN_AHEAD);
+        let ahead = self.lease.alone_max() + FAN_AHEAD_SPARE;
+        let until = self.board.motion_in(ahead, now);
         while let Some((at, speed)) = self.stream.kept.next_fan(until) {
             self.thermal.set_fan(speed, Some(at), &mut self.board, now);
         }
