@@ -23,6 +23,9 @@ interface Planner {
   };
 }
 
+// The test itself plans, on the main thread: nothing of the page does.
+test.use({ areTasksJudged: false });
+
 test('the browser’s planner gives the native planner’s bytes', async ({ page, panel, watch }) => {
   // The module that the page itself has loaded; its own glue leaves out what only this test calls.
   const isModule = (address: string): boolean => /\/assets\/planner_wasm_bg-[^/]+\.wasm$/.test(address);

@@ -8,6 +8,9 @@ import { ROWS } from '../serial/rows.ts';
 /** In the realm. */
 declare const kit: Kit;
 
+// What is tested here are the tests' own doubles, on whatever thread they run.
+test.use({ areTasksJudged: false });
+
 const VENDOR = 0x1209;
 
 async function machineWorker(panel: SerialPanel): Promise<Realm> {

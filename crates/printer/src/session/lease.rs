@@ -18,6 +18,8 @@ use crate::config::PrinterConfig;
 const ALIVE: Seconds = Seconds(2.0);
 /// How often the lease is renewed.
 const RENEW: Seconds = Seconds(0.15);
+/// A renewal that may come behind the end of the run waits until the lease has only this long to go.
+const ALIVE_SPARE: Seconds = Seconds(1.0);
 /// The shortest ramp between the full rate and rest …
 const RAMP_MIN: Seconds = Seconds(0.3);
 /// … which adds at most this part of a motor's acceleration to the plan's own.
@@ -42,6 +44,20 @@ struct Told {
     has_end: bool,
     /// Nothing of the run is covered yet.
     at_start: bool,
+}
+
+impl Told {
+    /// Whether the lease needs no renewal: motion gets to its end before. Renewed behind that, it would be one that covers
+    /// nothing, and the board would hold; so where it may be there by the time that a renewal is, that waits while it can.
+    fn lasts(&self, board: &Board, now: Seconds) -> bool {
+        if !self.has_end {
+            return false;
+        }
+        let clock_now = board.clock_at(now);
+        let gets_there = board.motion.at(clock_now.max(self.alive)) >= self.covered;
+        let may_be_there = board.motion.latest(board.output_clock(now)) >= self.covered;
+        gets_there || may_be_there && clock_now + board.ticks(ALIVE_SPARE) < self.alive
+    }
 }
 
 /// The motion that may be vouched for.
@@ -136,12 +152,7 @@ impl Lease {
             return;
         }
         let ends = cover.is_end && !told.has_end;
-        // Renewed behind its end, it would be one that covers nothing.
-        let clocks = board.clocks(now);
-        let until_end = clocks.until_motion(told.covered).filter(|_| told.has_end);
-        let is_over = told.has_end && clocks.motion >= told.covered;
-        let lasts = is_over || until_end.is_some_and(|until| clocks.hardware + until < told.alive);
-        if ends || !lasts && now - told.at >= RENEW {
+        if ends || now - told.at >= RENEW && !told.lasts(board, now) {
             self.tell(cover, board, now);
         }
     }
@@ -181,5 +192,56 @@ impl Lease {
     /// The board has no lease any more: it has dropped its queue, or all of that has been made.
     pub(super) const fn forget(&mut self) {
         self.told = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::motion_time::{Heard, MotionReport};
+
+    /// Whether it is renewed each time, on a board that has said at 10 s that it is at 10 s, speeding up from a rate.
+    fn renewed(rate: u16, told: Told, times: &[f64]) -> Vec<bool> {
+        let config =
+            crate::config::parse(include_str!("../../../../samples/printer.cfg")).0.expect("a machine");
+        let mut board = Board::for_tests(&config);
+        let clock = board.clock_at(Seconds(10.0));
+        board.motion.trust(clock);
+        board.motion.tell(4096, clock);
+        let low = clock.low().0;
+        let heard = Heard { clock_now: clock, said_after: Ticks(0), slack: Ticks(0) };
+        assert_eq!(board.motion.report(&MotionReport::new(low, low, rate, 3, 0), heard), Some(clock));
+        let run = Run { start: board.clock_at(Seconds(1.0)), end: Some(told.covered), homing: false };
+        let mut lease = Lease::new(&config);
+        let cover = Cover { until: told.covered, is_end: told.has_end };
+        times
+            .iter()
+            .map(|&time| {
+                lease.told = Some(told);
+                lease.renew(run, cover, &mut board, Seconds(time));
+                lease.told.is_some_and(|it| it.at == Seconds(time))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn it_is_not_renewed_where_that_may_come_behind_the_end() {
+        let config =
+            crate::config::parse(include_str!("../../../../samples/printer.cfg")).0.expect("a machine");
+        let board = Board::for_tests(&config);
+        let told = |covered: f64, has_end| Told {
+            at: Seconds(9.9),
+            covered: board.clock_at(Seconds(covered)),
+            alive: board.clock_at(Seconds(11.9)),
+            has_end,
+            at_start: false,
+        };
+        // It may have ended by then, or not.
+        assert_eq!(renewed(1200, told(10.2, true), &[10.06, 10.2, 10.5]), [false; 3]);
+        // So slow, it may be under way for long: not without a lease.
+        assert_eq!(renewed(4, told(10.2, true), &[10.2, 10.85, 10.95, 11.5]), [false, false, true, true]);
+        // It cannot be there yet, or there is no end.
+        assert_eq!(renewed(1200, told(20.0, true), &[10.0, 10.06, 10.2]), [false, true, true]);
+        assert_eq!(renewed(1200, told(10.2, false), &[10.0, 10.06, 10.2]), [false, true, true]);
     }
 }

@@ -80,20 +80,28 @@ impl MotionReport {
 /// The motion clock as last told.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MotionTime {
-    /// The hardware clock of what is known.
+    /// The hardware clock of what is claimed.
     clock: Ticks,
-    /// The motion clock then.
+    /// The motion clock then, at least.
     motion: Ticks,
+    /// As the board last said.
     rate: u16,
     state: MotionState,
     /// It slows down, or is slow, because it is held.
     is_hold: bool,
     /// The rate that the board was last told.
     told: u16,
+    /// When it was told that first, or to rest or to go on.
+    told_at: Ticks,
+    /// The lowest rate that it may be heading for: of all that it was told since its last word that fits what it had been
+    /// told by then. Never above `told`, and 0 for rest.
+    least_told: u16,
     /// It was told to come to rest, and not to go on.
     rests: bool,
     /// The clock of its last word.
     heard: Ticks,
+    /// The motion clock that it said.
+    said: Ticks,
     /// Since this hardware clock nothing is claimed beyond what is known: the board may have done anything.
     in_doubt: Option<Ticks>,
 }
@@ -118,8 +126,11 @@ impl Default for MotionTime {
             state: MotionState::Running,
             is_hold: false,
             told: RATE_ONE,
+            told_at: Ticks(0),
+            least_told: RATE_ONE,
             rests: false,
             heard: Ticks(0),
+            said: Ticks(0),
             in_doubt: None,
         }
     }
@@ -135,17 +146,19 @@ impl MotionTime {
         let since = clock.0 as i64 - self.clock.0 as i64;
         let made = match self.state {
             // A lower rate may be in force already, a higher one not yet.
-            MotionState::Running => scaled(since, self.rate.min(self.told)),
+            MotionState::Running => scaled(since, self.rate.min(self.least_told)),
             MotionState::Slowing if self.is_hold => 0,
-            MotionState::Slowing => scaled(since.max(0), self.rate.min(self.told)),
-            MotionState::Held | MotionState::Speeding => scaled(since.max(0), self.rate),
+            MotionState::Slowing | MotionState::Speeding => {
+                scaled(since.max(0), self.rate.min(self.least_told))
+            }
+            MotionState::Held => 0,
         };
         Ticks(self.motion.0.saturating_add_signed(made))
     }
 
     /// The latest that the motion clock can be at a hardware clock.
     pub(super) fn latest(&self, clock: Ticks) -> Ticks {
-        if self.is_steady() { self.at(clock) } else { self.motion + clock.saturating_sub(self.clock) }
+        if self.is_steady() { self.at(clock) } else { self.said + clock.saturating_sub(self.heard) }
     }
 
     /// The hardware clock at which the motion clock gets to `motion` at the earliest: at the full rate from now on.
@@ -162,26 +175,48 @@ impl MotionTime {
     /// The board is told another rate.
     pub(super) fn tell(&mut self, rate: u16, clock_now: Ticks) {
         self.rebase(clock_now);
+        if rate != self.told {
+            self.told_at = clock_now;
+        }
         self.told = rate;
+        self.least_told = self.least_told.min(rate);
     }
 
     /// The board is told to come to rest, or to go on.
     pub(super) fn tell_rest(&mut self, rests: bool, clock_now: Ticks) {
         self.rebase(clock_now);
+        if rests != self.rests {
+            self.told_at = clock_now;
+        }
         self.rests = rests;
+        if rests {
+            self.least_told = 0;
+        }
     }
 
-    /// What is claimed by now stays so.
+    /// What is claimed by now stays so: what the board is told next is not in force before.
     fn rebase(&mut self, clock_now: Ticks) {
-        if self.is_running() {
-            self.motion = self.at(clock_now);
-            self.clock = clock_now;
+        if !self.may_rest() && !self.rests {
+            let clock = clock_now.max(self.clock);
+            self.motion = self.at(clock);
+            self.clock = clock;
         }
+    }
+
+    /// Whether the board's word, said at `clock`, can follow from what it was told last, and so from nothing before that. In
+    /// a ramp downwards it may be on its way to what it was told before.
+    fn fits(&self, clock: Ticks) -> bool {
+        let is_on_the_way = match self.state {
+            MotionState::Running => self.rate == self.told,
+            MotionState::Speeding => self.rate <= self.told,
+            MotionState::Slowing | MotionState::Held => false,
+        };
+        is_on_the_way && !self.rests && clock >= self.told_at
     }
 
     /// Whether motion goes at the rate that the board was last told.
     pub(super) const fn is_as_told(&self) -> bool {
-        self.is_running() && self.rate == self.told
+        self.is_running() && self.rate == self.told && self.least_told == self.told
     }
 
     /// Whether motion is at rest, wherever on its path.
@@ -201,7 +236,7 @@ impl MotionTime {
 
     /// Whether the two clocks are a fixed lag apart, and stay so.
     pub(super) const fn is_steady(&self) -> bool {
-        self.is_running() && self.rate == RATE_ONE && self.told == RATE_ONE
+        self.is_running() && self.rate == RATE_ONE && self.least_told == RATE_ONE
     }
 
     /// The clock up to which the board's word is known.
@@ -213,6 +248,7 @@ impl MotionTime {
     pub(super) fn trust(&mut self, clock: Ticks) {
         if self.is_steady() {
             self.motion = self.at(clock);
+            self.said = self.motion;
             (self.clock, self.heard) = (clock, clock);
         }
     }
@@ -234,11 +270,15 @@ impl MotionTime {
             return None;
         }
         self.motion = self.about(report, clock).nearest(report.motion);
+        self.said = self.motion;
         (self.clock, self.heard) = (clock, clock);
         self.rate = report.rate.min(RATE_ONE);
         self.state = report.state;
         self.is_hold = report.reason != HoldReason::None;
         self.in_doubt = None;
+        if self.fits(clock) {
+            self.least_told = self.told;
+        }
         Some(clock)
     }
 
@@ -357,6 +397,85 @@ mod tests {
         assert_eq!((time.at(Ticks(9000)), time.is_held()), (Ticks(4200), true));
         assert!(time.report(&MotionReport::new(8000, 5000, RATE_ONE, 0, 0), heard(8000)).is_some());
         assert_eq!((time.at(Ticks(9000)), time.is_steady()), (Ticks(6000), true));
+    }
+
+    /// At 1 MHz, with a ramp of 0.3 s.
+    const fn said(clock: u32, motion: u32, rate: u16, state: u8) -> MotionReport {
+        MotionReport::new(clock, motion, rate, state, 0)
+    }
+
+    #[test]
+    fn what_is_undone_in_the_ramp_is_not_claimed() {
+        const START: u64 = 1_000_000;
+        let mut time = MotionTime::default();
+        time.trust(Ticks(START));
+        time.tell(41, Ticks(START));
+        assert!(time.report(&said(1_002_000, 1_002_000, 4088, 1), heard(START + 3000)).is_some());
+        let before = time.at(Ticks(START + 240_000));
+        assert_eq!(before, Ticks(1_004_382));
+        time.tell(RATE_ONE, Ticks(START + 240_000));
+        assert_eq!(time.at(Ticks(START + 240_000)), before);
+        // The board may have come to the lower rate and stay there, for all that is known; or it never left the full one.
+        assert_eq!(time.at(Ticks(START + 340_000)), Ticks(1_005_382));
+        assert_eq!(time.latest(Ticks(START + 340_000)), Ticks(START + 340_000));
+        // Said before it was told: still the ramp downwards.
+        assert!(time.report(&said(1_239_000, 1_145_000, 856, 1), heard(START + 241_000)).is_some());
+        assert_eq!(time.at(Ticks(START + 339_000)), Ticks(1_146_000));
+        // It goes up again, and falls no more.
+        assert!(time.report(&said(1_260_000, 1_149_500, 1000, 3), heard(START + 261_000)).is_some());
+        assert_eq!(time.at(Ticks(1_260_000 + 40_960)), Ticks(1_159_500));
+        assert!(!time.is_as_told() && !time.is_steady());
+        assert!(time.report(&said(1_490_000, 1_292_000, 4096, 0), heard(START + 491_000)).is_some());
+        assert!(time.is_as_told() && time.is_steady());
+        // Down, up, and down before the board's next word: never more than the lowest.
+        time.tell(2048, Ticks(1_500_000));
+        assert!(time.report(&said(1_500_500, 1_302_500, 4000, 1), heard(1_500_600)).is_some());
+        time.tell(3000, Ticks(1_501_000));
+        assert!(time.report(&said(1_501_500, 1_303_400, 2900, 3), heard(1_501_600)).is_some());
+        time.tell(41, Ticks(1_502_000));
+        assert_eq!(time.at(Ticks(1_502_000)), Ticks(1_303_754));
+        assert_eq!(time.at(Ticks(1_502_000 + 4096)), Ticks(1_303_795));
+    }
+
+    #[test]
+    fn a_word_that_was_on_the_line_is_none_on_what_the_board_is_told_after_it() {
+        let mut time = MotionTime::default();
+        time.trust(Ticks(1_000_000));
+        time.tell(1024, Ticks(1_000_000));
+        time.tell(RATE_ONE, Ticks(1_100_000));
+        assert!(time.report(&said(1_000_500, 1_000_500, 4096, 0), heard(1_100_100)).is_some());
+        assert!(!time.is_steady() && !time.is_as_told());
+        assert_eq!(time.at(Ticks(1_000_500 + 4096)), Ticks(1_001_524));
+        // Told the same again, it is the first time that counts.
+        time.tell(RATE_ONE, Ticks(1_600_000));
+        assert!(time.report(&said(1_599_000, 1_580_000, 4096, 0), heard(1_600_100)).is_some());
+        assert!(time.is_steady() && time.is_as_told());
+    }
+
+    #[test]
+    fn a_rest_that_is_taken_back_is_believed_until_the_board_says_more() {
+        let mut time = MotionTime::default();
+        time.trust(Ticks(1_000_000));
+        time.tell_rest(true, Ticks(1_010_000));
+        time.tell_rest(false, Ticks(1_110_000));
+        assert_eq!((time.at(Ticks(1_200_000)), time.is_steady()), (Ticks(1_010_000), false));
+        assert_eq!(time.latest(Ticks(1_200_000)), Ticks(1_200_000));
+        assert!(time.report(&said(1_300_000, 1_150_000, 2000, 3), heard(1_300_100)).is_some());
+        assert_eq!(time.at(Ticks(1_300_000 + 4096)), Ticks(1_152_000));
+    }
+
+    #[test]
+    fn the_latest_counts_from_what_the_board_said() {
+        let mut time = MotionTime::default();
+        time.trust(Ticks(1000));
+        assert!(time.report(&said(5000, 5000, 2048, 0), heard(5100)).is_some());
+        time.tell(RATE_ONE, Ticks(9000));
+        assert_eq!((time.at(Ticks(9000)), time.latest(Ticks(9000))), (Ticks(7000), Ticks(9000)));
+        time.tell(1024, Ticks(13_000));
+        assert_eq!((time.at(Ticks(13_000)), time.latest(Ticks(13_000))), (Ticks(9000), Ticks(13_000)));
+        time.tell_rest(true, Ticks(17_000));
+        assert_eq!((time.at(Ticks(17_000)), time.latest(Ticks(17_000))), (Ticks(10_000), Ticks(17_000)));
+        assert_eq!(time.hardware(Ticks(18_000), Ticks(17_000)), Ticks(18_000));
     }
 
     #[test]

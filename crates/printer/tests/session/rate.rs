@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use printer::session::{Event, JobStatus, Request, ScheduledMove};
-use units::Ticks;
+use units::{Seconds, Ticks};
 use virtual_printer::BoardProfile;
 
 use crate::{
@@ -191,6 +191,30 @@ fn a_board_without_a_motion_clock_is_told_nothing() {
     assert_near(speed(&mut bench), STEPS_S, "the queue");
     bench.job_done();
     assert_eq!(bench.printer.now(), bench.printer.motion_now());
+}
+
+/// No more motion is claimed than the board can have made: what it still holds takes room in its queue.
+#[test]
+fn what_is_undone_in_its_ramp_is_not_claimed() {
+    for board in [BoardProfile::rp2040(), BoardProfile::stm32f103()] {
+        let setup = setup(board);
+        let (mut bench, _) = on_the_way(&setup, &long(6));
+        // Of the estimate of the board's clock.
+        let slack = setup.board.clock.ticks_in(Seconds(0.005));
+        for (slow, wait) in [(0.01, 0.24), (0.01, 0.1), (0.3, 0.15), (0.05, 0.01), (0.01, 0.29)] {
+            for (factor, wait) in [(slow, wait), (1.0, 0.06), (slow, 0.05), (1.0, 0.5)] {
+                bench.ask(Request::SetSpeedFactor(factor));
+                let until = bench.now() + Seconds(wait);
+                while bench.now() < until {
+                    let claimed = bench.session.motion_clock(bench.now()).expect("a board");
+                    let made = bench.printer.motion_now();
+                    assert!(claimed <= made + slack, "{factor} of {slow}: {claimed:?} of {made:?}");
+                    bench.run(0.000_5);
+                }
+            }
+        }
+        bench.job_done();
+    }
 }
 
 #[test]
