@@ -365,10 +365,10 @@ fn a_motor_s_torque_is_read_into_what_its_axis_can_do() {
     let abilities = config.unwrap().abilities;
     assert!(abilities[1..].iter().all(Option::is_none));
     let x = abilities[0].as_ref().unwrap();
-    // 0.6·0.6 N·m are left at 2000 steps/s, which are 400 mm/s; nothing beyond is known.
+    // 0.3·0.6 N·m are left at 2000 steps/s, which are 400 mm/s; nothing beyond is known.
     assert_eq!(x.top(), MmPerS(400.0));
     let accel = x.accel_at(MmPerS(0.0), motion::Demand::Speed).0;
-    let exact = (0.6 * 2.2 - 0.1) / 480e-7 * 40.0 / core::f64::consts::TAU;
+    let exact = (0.3 * 2.2 - 0.1) / 480e-7 * 40.0 / core::f64::consts::TAU;
     assert!((0.97..=1.0).contains(&(accel / exact)), "{accel} {exact}");
 }
 
@@ -386,7 +386,7 @@ fn a_torque_that_no_motor_has_is_told_with_its_line() {
     for (wrong, said) in [
         ("pull_out_torque: 0: 2.2, x", "not a pair"),
         ("pull_out_torque: 10: 2.2, 20: 1", "must start at 0"),
-        ("pull_out_torque: 0: 2.2, 400: 2.1\nload_torque: 2", "leaves nothing"),
+        ("pull_out_torque: 0: 2.2, 400: 2.1\nload_torque: 1", "leaves nothing"),
         ("pull_out_torque: 0: 2.2, 400: 2.1\nresonances: 40-20", "not a band"),
         ("pull_out_torque: 0: 2.2, 400: 2.1\ntorque_margin: 1.2", "at most 1"),
     ] {

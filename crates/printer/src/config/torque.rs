@@ -11,8 +11,9 @@ use super::diagnostics::excerpt;
 use super::reader::{Checked, Range, Reader};
 use super::stepper::MotorConfig;
 
-/// Less than the 0.72 of its torque at whose sudden demand a rotor without damping loses step.
-const MARGIN_DEFAULT: f64 = 0.6;
+/// A rotor without damping loses step at a sudden demand of 0.72 of its torque, and from speeding up to slowing down the demand
+/// changes by twice the margin. The rest is for parts that differ (`stepcast torque`).
+const MARGIN_DEFAULT: f64 = 0.3;
 /// No motor of a machine of this kind turns faster.
 const RATE_MAX: f64 = 1e6;
 const TORQUE_NM_MAX: f64 = 1e3;
