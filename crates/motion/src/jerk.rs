@@ -9,7 +9,7 @@
 //! What a knot cannot be reached from, or cannot reach, lowers it: one pass backward and one forward over all of them.
 //!
 //! A window of moves is worked on at a time, as if it ended at rest, and its first half is given out: when that is done
-//! depends on the number of moves alone. Where the window is cut, the speed is so low that every limit behind can be met
+//! depends on the moves alone. Where the window is cut, the speed is so low that every limit behind can be met
 //! whatever comes after the window.
 
 use crate::PlannedMove;
@@ -17,8 +17,10 @@ use crate::planned::Phase;
 use crate::s_curve::{End, Limits, highest};
 use std::collections::VecDeque;
 
-/// Moves that are worked on at a time.
+/// Moves that are worked on at a time …
 pub(crate) const WINDOW_MOVES: usize = 512;
+/// … fewer where they last longer, in s, so that a pause or another speed does not wait for them.
+const WINDOW_TIME_S: f64 = 3.0;
 /// Where the path's direction changes by more than this, it has a corner: the cosine of 5°.
 const CORNER_COS: f64 = 0.996_194_698_091_745_5;
 /// Speeds that are above their limit by no more than this share are on it: rounding.
@@ -36,6 +38,8 @@ pub(crate) struct JerkLimiter {
     jerk: f64,
     /// Trapezoids that wait, oldest first.
     waiting: VecDeque<PlannedMove>,
+    /// How long they take, s.
+    waiting_time: f64,
     /// Speed at the start of the first of them.
     speed: f64,
     /// The direction of the move before it.
@@ -53,7 +57,14 @@ struct Stretch {
 
 impl JerkLimiter {
     pub(crate) fn new(jerk_mm_s3: f64) -> Self {
-        Self { jerk: jerk_mm_s3, waiting: VecDeque::new(), speed: 0.0, before: None, print_time: 0.0 }
+        Self {
+            jerk: jerk_mm_s3,
+            waiting: VecDeque::new(),
+            waiting_time: 0.0,
+            speed: 0.0,
+            before: None,
+            print_time: 0.0,
+        }
     }
 
     pub(crate) fn begin_run(&mut self) {
@@ -69,8 +80,8 @@ impl JerkLimiter {
     }
 
     /// How long the moves that wait take at least.
-    pub(crate) fn pending_time(&self) -> f64 {
-        self.waiting.iter().map(PlannedMove::duration).sum()
+    pub(crate) const fn pending_time(&self) -> f64 {
+        self.waiting_time
     }
 
     /// The machine waits at rest, with nothing left to give out.
@@ -80,9 +91,11 @@ impl JerkLimiter {
 
     /// Takes a move that is final but for its jerk.
     pub(crate) fn push(&mut self, planned: PlannedMove, out: &mut VecDeque<PlannedMove>) {
+        self.waiting_time += planned.duration();
         self.waiting.push_back(planned);
-        if self.waiting.len() >= WINDOW_MOVES {
-            self.release(WINDOW_MOVES / 2, out);
+        let waiting = self.waiting.len();
+        if waiting >= WINDOW_MOVES || waiting >= 2 && self.waiting_time >= WINDOW_TIME_S {
+            self.release(waiting / 2, out);
         }
     }
 
@@ -111,6 +124,7 @@ impl JerkLimiter {
         self.speed = window.speed(end);
         self.before = end.checked_sub(1).map(|last| moves[last].direction);
         self.waiting.drain(..end);
+        self.waiting_time = self.waiting.iter().map(PlannedMove::duration).sum();
     }
 }
 
@@ -272,7 +286,14 @@ impl<'a> Window<'a> {
         if count >= end {
             return end;
         }
-        let knot = (count..end).find(|&junction| self.speeds[junction].is_some()).unwrap_or(end);
+        let found = (count..end).find(|&junction| self.speeds[junction].is_some());
+        let knot = found.unwrap_or_else(|| {
+            // On a smooth path: one is made, as fast as it can be.
+            self.speeds[count] = Some(self.limit(count));
+            self.keep_in_reach();
+            self.solve();
+            count
+        });
         let limits = self.limits(Stretch { first: 0, last: end });
         let is_safe = |speed: f64| {
             (knot + 1..=end).all(|junction| {

@@ -97,6 +97,40 @@ fn a_ramp_over_many_straight_pieces_is_that_of_one_move() {
 }
 
 #[test]
+fn a_smooth_path_longer_than_the_window_is_not_stopped_on() {
+    // A straight one, and a circle of 100 mm, in pieces of a tenth of a millimetre.
+    let straight: Vec<_> = (1..=6000).map(|index| ([0.1 * f64::from(index), 0.0, 0.0, 0.0], 200.0)).collect();
+    let circle: Vec<_> = (1..=6000)
+        .map(|index| {
+            let angle = 0.001 * f64::from(index);
+            ([100.0 * libm::sin(angle), 100.0 - 100.0 * libm::cos(angle), 0.0, 0.0], 200.0)
+        })
+        .collect();
+    for points in [straight, circle] {
+        let made = plan(&points, limits(3000.0), Some(1e5));
+        check(&made, &plan(&points, limits(3000.0), None), 1e5);
+        let slowest = made[500..5500].iter().map(|one| one.start_velocity).fold(f64::INFINITY, f64::min);
+        assert!(slowest > 199.0, "{slowest}");
+        let (whole, time) = (600.0 / 200.0 + 200.0 / 3000.0 + 0.03, made.last().unwrap().end_time());
+        assert!((time / whole - 1.0).abs() < 0.001, "{time} {whole}");
+    }
+}
+
+#[test]
+fn long_moves_do_not_wait_for_hundreds_of_others() {
+    let profile = Profile { motors: Vec::new(), max_jerk: Some(MmPerS3(1e5)) };
+    let mut look_ahead = LookAhead::with_profile(limits(3000.0), profile).unwrap();
+    let mut from = [0.0; 4];
+    for index in 0..100 {
+        let to = [f64::from(index % 2) * 100.0, f64::from(index), 0.0, 0.0];
+        look_ahead.push(&MoveRequest { from, to, feed: MmPerS(100.0), tag: 0 }).unwrap();
+        while look_ahead.pop().is_some() {}
+        from = to;
+    }
+    assert!(look_ahead.len() < 25, "{}", look_ahead.len());
+}
+
+#[test]
 fn a_jerk_without_bounds_costs_nothing() {
     let points: Vec<_> = (0..200)
         .map(|index| ([f64::from(index % 7) * 9.0, f64::from(index % 5) * 11.0, 0.0, 0.0], 150.0))

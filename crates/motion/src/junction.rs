@@ -192,6 +192,10 @@ impl Entry {
             if let (Some(motor), true) = (motor, jump > 0.0) {
                 let speed = motor.start().0 / jump;
                 limit = limit.min(speed * speed);
+                // On a curve the motor is asked for what turning takes, however small each corner is.
+                let bend = jump / (0.5 * (self.length + previous.length));
+                let share = self.direction[axis].abs().max(previous.direction[axis].abs());
+                limit = motor.bend_limit(limit, bend, share, false);
             }
         }
         limit

@@ -12,7 +12,7 @@
 
 use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, TAU};
 use thiserror::Error;
-use units::{Mm, MmPerS};
+use units::{Mm, MmPerS, MmPerS2};
 
 /// The most points of a torque table.
 pub const TORQUE_POINTS_MAX: usize = 64;
@@ -243,6 +243,11 @@ impl MotorAbility {
         MmPerS(self.top)
     }
 
+    /// What the axis can slow down by at its top speed.
+    pub fn slowing_at_top(&self) -> MmPerS2 {
+        MmPerS2(self.slowing.last().map_or(0.0, |last| last.accel))
+    }
+
     /// The speed that the axis may jump by.
     pub const fn start(&self) -> MmPerS {
         MmPerS(self.start)
@@ -258,6 +263,22 @@ impl MotorAbility {
             calm = low;
         }
         calm
+    }
+
+    /// The highest squared speed along the path, up to `limit_v2`, at which the motor can follow a path that bends by `bend`
+    /// (change of its share per mm): that takes v²·bend of acceleration, at the speed v·`share`.
+    pub(crate) fn bend_limit(&self, limit_v2: f64, bend: f64, share: f64, exact: bool) -> f64 {
+        let ability = |v2: f64| {
+            let of = |demand: Demand| {
+                if exact {
+                    self.exact(v2.sqrt() * share, demand)
+                } else {
+                    self.at(v2 * share * share, demand).0
+                }
+            };
+            of(Demand::Speed).min(of(Demand::Slow))
+        };
+        crate::s_curve::highest(0.0, limit_v2, |v2| v2 * bend <= ability(v2))
     }
 
     /// The acceleration (mm/s²) just above a squared speed, and the squared speed up to which it is there.
@@ -286,7 +307,7 @@ impl MotorAbility {
     }
 
     /// The same in speeds: acceleration of the axis at a speed.
-    pub fn accel_at(&self, speed: MmPerS, demand: Demand) -> units::MmPerS2 {
-        units::MmPerS2(self.at(speed.0 * speed.0, demand).0)
+    pub fn accel_at(&self, speed: MmPerS, demand: Demand) -> MmPerS2 {
+        MmPerS2(self.at(speed.0 * speed.0, demand).0)
     }
 }

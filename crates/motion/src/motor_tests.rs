@@ -134,6 +134,25 @@ fn the_time_of_a_ramp_is_the_integral_over_the_torque_that_is_left() {
 }
 
 #[test]
+fn a_curve_of_tiny_pieces_asks_no_motor_for_more_than_a_straight_way() {
+    let torque = torque();
+    let radius = 10.0;
+    let points: Vec<_> = (1..=2000)
+        .map(|index| {
+            let angle = 0.005 * f64::from(index);
+            ([radius * libm::sin(angle), radius - radius * libm::cos(angle), 0.0, 0.0], 2000.0)
+        })
+        .collect();
+    let planned = plan(&torque, &points, limits());
+    let top = planned.iter().map(|one| one.cruise_velocity).fold(0.0, f64::max);
+    let ability = torque.ability().unwrap();
+    // Where an axis turns round, all of the path's v²/R is its own.
+    let can = ability.accel_at(MmPerS(0.0), Demand::Speed).0;
+    assert!(top * top / radius <= can * 1.01, "{top} {can}");
+    assert!(top > 50.0, "{top}");
+}
+
+#[test]
 fn nothing_cruises_in_a_band_of_resonance() {
     // 20 ..= 40 steps/s are 4 ..= 8 mm/s.
     let torque = Torque { resonances: vec![(20.0, 40.0), (39.0, 60.0)], ..torque() };

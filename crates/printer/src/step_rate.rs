@@ -14,6 +14,8 @@ use crate::{
     planner::Position,
 };
 
+/// The usual smoothing of pressure advance weighs half of its time, 0.04 s.
+const SMOOTHED: Seconds = Seconds(0.02);
 /// A speed that is beyond the bound by no more than this share of it is on it: rounding.
 const SLACK: f64 = 1e-9;
 
@@ -92,8 +94,13 @@ impl StepRates {
         };
         for motor in motors {
             let share = delta[motor].abs() / length;
-            let z_bound = if motor == 2 { limits.max_z_velocity } else { speed };
-            if share > 0.0 && z_bound.min(speed * share) > self.speed_max[motor] * (1.0 + SLACK) {
+            let bound = match motor {
+                0 | 1 => limits.max_xy_velocity[motor],
+                2 => limits.max_z_velocity,
+                _ => speed,
+            };
+            let bound = self.torque_tops[motor].map_or(bound, |top| bound.min(top));
+            if share > 0.0 && bound.min(speed * share) > self.speed_max[motor] * (1.0 + SLACK) {
                 return Err(too_fast(motor, speed * share, line.0));
             }
         }
@@ -111,13 +118,21 @@ impl StepRates {
             .fold(feed, |feed, motor| feed.min(self.speed_max[motor] * (length / delta[motor])))
     }
 
+    /// What pressure advance adds to a move's speed at most, mm/s along its path: a ramp counts with its acceleration, one
+    /// that is shorter than the smoothing with what is left of it.
+    fn added(&self, planned: &PlannedMove) -> f64 {
+        let change = planned.cruise_velocity - planned.start_velocity.min(planned.end_velocity);
+        let accel = planned.phases().map(|phase| phase.accel.abs()).fold(0.0, f64::max);
+        self.advance.0 * accel.min(change / SMOOTHED.0)
+    }
+
     /// Refuses a planned move in which a motor would have to step faster than it can.
     /// Where it draws, pressure advance adds to the filament's speed.
     pub fn judge_planned(&self, planned: &PlannedMove) -> Result<(), PrinterError> {
         let draws =
             planned.direction[EXTRUDER] > 0.0 && (planned.direction[0] != 0.0 || planned.direction[1] != 0.0);
         for motor in 0..MOTORS {
-            let added = if draws && motor == EXTRUDER { self.advance.0 * planned.accel } else { 0.0 };
+            let added = if draws && motor == EXTRUDER { self.added(planned) } else { 0.0 };
             let speed = MmPerS((planned.cruise_velocity + added) * planned.direction[motor].abs());
             if speed > self.speed_max[motor] * (1.0 + SLACK) {
                 return Err(too_fast(motor, speed, planned.tag));

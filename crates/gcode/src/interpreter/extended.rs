@@ -141,7 +141,7 @@ impl Interpreter {
         Ok(Some(match call.name {
             "SET_VELOCITY_LIMIT" => Action::VelocityLimit(self.velocity_limit(call, out)?),
             "SET_PRESSURE_ADVANCE" => Action::PressureAdvance {
-                advance: call.number("ADVANCE", 0.0..=1e3, out)?,
+                advance: call.number("ADVANCE", 0.0..=10.0, out)?,
                 smooth_time: call.number("SMOOTH_TIME", 0.0..=0.2, out)?.map(Seconds),
             },
             "SET_INPUT_SHAPER" => Action::InputShaper(call.input_shaper(out)?),

@@ -20,7 +20,7 @@ pub(super) fn hint(key: &str) -> &'static str {
         }
         "inertia" => "the inertia of rotor and load in g·cm², as the motor's shaft feels it, e.g. 480",
         "load_torque" => "the torque of friction at the motor's shaft in N·m, e.g. 0.1",
-        "torque_margin" => "the share of the torque that may be asked for, above 0 to 1, e.g. 0.6",
+        "torque_margin" => "the share of the torque that may be asked for, above 0 to 1, e.g. 0.3",
         "resonances" => "the bands of full steps/s in which the motor shakes, e.g. 20-40, 90-110",
         "step_pin" | "dir_pin" => "the pin that the motor driver is wired to, e.g. gpio2 or !PA3",
         "enable_pin" => "the driver's enable pin, usually inverted, e.g. !gpio4",

@@ -22,6 +22,8 @@ const RENEW: Seconds = Seconds(0.15);
 const ALIVE_SPARE: Seconds = Seconds(1.0);
 /// The shortest ramp between the full rate and rest …
 const RAMP_MIN: Seconds = Seconds(0.3);
+/// … and the longest: what runs on meanwhile has to be queued.
+const RAMP_MAX: Seconds = Seconds(3.0);
 /// … which adds at most this part of a motor's acceleration to the plan's own.
 const ADDED_PART: f64 = 1.0 / 3.0;
 /// The ramp where nothing moves, or what moves is all there.
@@ -91,8 +93,17 @@ impl Lease {
                 .as_ref()
                 .map(|extruder| (extruder.max_extrude_only_velocity.0, extruder.max_extrude_only_accel.0)),
         );
+        for axis in 0..2 {
+            let velocity = printer.max_xy_velocity[axis].min(printer.max_velocity);
+            limits.push((velocity.0, printer.max_xy_accel[axis].0));
+        }
+        // A plan by torque leaves motors most of it: a ramp may ask for as much again.
+        for ability in config.abilities.iter().flatten() {
+            let velocity = ability.top().min(printer.max_velocity);
+            limits.push((velocity.0, ability.slowing_at_top().0 / ADDED_PART));
+        }
         let ramps = limits.iter().map(|(velocity, accel)| velocity / (accel * ADDED_PART));
-        let ramp = Seconds(ramps.fold(RAMP_MIN.0, f64::max));
+        let ramp = Seconds(ramps.fold(RAMP_MIN.0, f64::max).min(RAMP_MAX.0));
         Self { ramp, told: None, asked: Seconds(f64::NEG_INFINITY) }
     }
 
