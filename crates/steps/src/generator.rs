@@ -36,13 +36,17 @@ pub struct Filters {
 
 /// The widest window of smoothing.
 pub const SMOOTH_TIME_MAX: Seconds = Seconds(0.2);
+/// A shorter window smooths nothing, and would weigh the last digits of long runs.
+const SMOOTH_TIME_MIN: Seconds = Seconds(0.002);
 
 impl Filters {
     /// The filter on one axis.
     fn on(&self, axis: usize) -> Option<Filter> {
         match self.shapers.get(axis) {
             Some(shaper) => shaper.as_ref().map(Filter::shaper),
-            None => self.smooth_time.map(|time| Filter::smoothing(time.0.clamp(1e-4, SMOOTH_TIME_MAX.0))),
+            None => self
+                .smooth_time
+                .map(|time| Filter::smoothing(time.0.clamp(SMOOTH_TIME_MIN.0, SMOOTH_TIME_MAX.0))),
         }
     }
 }
