@@ -66,7 +66,7 @@ fn at_every_pulse_the_filament_is_what_the_path_drawn_takes() {
         let seconds = tick as f64 / ticks;
         let on = moves.iter().rfind(|made| made.start_time <= seconds).unwrap();
         let way = [on.to[0] - on.from[0], on.to[1] - on.from[1]];
-        let length = way[0].hypot(way[1]);
+        let length = libm::hypot(way[0], way[1]);
         let head =
             [pulses[0].count(tick) as f64 * x - on.from[0], pulses[1].count(tick) as f64 * y - on.from[1]];
         let drawn = (head[0] * way[0] + head[1] * way[1]) / length;
