@@ -21,6 +21,8 @@ export interface FilePreview {
   takeVertices(): Uint32Array<ArrayBuffer>;
   /** Pairs of a line and the vertex where its segment ends, new since last time. */
   takeMarks(): Uint32Array<ArrayBuffer>;
+  /** What the planner knows of the vertices, in their order, later than they come; new since last time. */
+  takeChannels(): Uint32Array<ArrayBuffer>;
   /** After `finish`. */
   summary(): Summary;
   free(): void;
