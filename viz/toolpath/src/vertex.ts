@@ -19,6 +19,7 @@ export const FIELDS = {
   feature: { word: 2, shift: 20, bits: 5 },
   layer: { word: 3, shift: 0, bits: 20 },
   tool: { word: 3, shift: 20, bits: 4 },
+  object: { word: 3, shift: 24, bits: 8 },
 } as const;
 
 export type FieldName = keyof typeof FIELDS;
@@ -31,6 +32,7 @@ export const FLAGS = {
   unretract: 1 << 28,
   seam: 1 << 29,
   wipe: 1 << 30,
+  pause: 2 ** 31,
 } as const;
 
 /** Millimetres of one unit of `width` and `height`. */
@@ -80,12 +82,15 @@ export interface Vertex {
   readonly feature: FeatureName;
   readonly layer: number;
   readonly tool: number;
+  /** 0: belongs to none; 255: to one beyond the 254 that are told apart. */
+  readonly object: number;
   readonly travel: boolean;
   readonly break: boolean;
   readonly retract: boolean;
   readonly unretract: boolean;
   readonly seam: boolean;
   readonly wipe: boolean;
+  readonly pause: boolean;
 }
 
 /** The value of one field of the vertex at `index`; 0 beyond the end. */
@@ -125,12 +130,14 @@ export function decodeVertex(header: VertexHeader, words: Uint32Array, index: Ve
     feature: featureName(field(words, index, 'feature')),
     layer: field(words, index, 'layer'),
     tool: field(words, index, 'tool'),
+    object: field(words, index, 'object'),
     travel: hasFlag(words, index, FLAGS.travel),
     break: hasFlag(words, index, FLAGS.break),
     retract: hasFlag(words, index, FLAGS.retract),
     unretract: hasFlag(words, index, FLAGS.unretract),
     seam: hasFlag(words, index, FLAGS.seam),
     wipe: hasFlag(words, index, FLAGS.wipe),
+    pause: hasFlag(words, index, FLAGS.pause),
   };
 }
 
@@ -142,6 +149,7 @@ export interface VertexInput {
   readonly feature?: FeatureName;
   readonly layer?: number;
   readonly tool?: number;
+  readonly object?: number;
   /** Any of {@link FLAGS}, or-ed. */
   readonly flags?: number;
 }
@@ -165,5 +173,6 @@ export function encodeVertex(
   words[base] = place('x', steps(0)) | place('width', size(input.widthMm));
   words[base + 1] = place('y', steps(1)) | place('height', size(input.heightMm));
   words[base + 2] = place('z', steps(2)) | place('feature', feature) | (input.flags ?? 0);
-  words[base + 3] = place('layer', input.layer ?? 0) | place('tool', input.tool ?? 0);
+  words[base + 3] =
+    place('layer', input.layer ?? 0) | place('tool', input.tool ?? 0) | place('object', input.object ?? 0);
 }
