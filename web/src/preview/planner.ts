@@ -138,6 +138,10 @@ class WasmPreview implements FilePreview {
     return this.#inner.take_marks() as Uint32Array<ArrayBuffer>;
   }
 
+  takeChannels(): Uint32Array<ArrayBuffer> {
+    return new Uint32Array();
+  }
+
   summary(): Summary {
     return fromSummary(JSON.parse(this.#inner.summary()) as PreviewSummary);
   }

@@ -1,6 +1,6 @@
 // The preview worker: reads a file through the planner's preview and hands out geometry, findings and estimates. Also
 // checks printer.cfg texts. One file at a time: a new one ends the reading of the one before.
-import type { SourcedRequest, ViewRequest } from '@stepcast/toolpath/messages';
+import type { SourcedRequest, ViewRequest } from '@stepcast/toolpath';
 import { FileChunks, linesOf, type Packing, packingOf } from '../files';
 import { fileUnreadable, plannerMissing } from '../machine/troubles';
 import { LineIndex } from './line_index';

@@ -69,7 +69,6 @@ function Thumb({ handle, props, share }: ThumbProps): JSX.Element {
   const value = handle === 'from' ? from : to;
   const [low, high] = handle === 'from' ? [min, to] : [from, max];
   return (
-    // biome-ignore lint/a11y/useFocusableInteractive: it is focusable; the rule does not see the number
     <div
       class={`range-thumb ${handle}`}
       role="slider"
