@@ -10,6 +10,7 @@ export { type HexColour, PALETTES, type Palette, type Theme } from './palette';
 export type { CssPx, LayerIndex, Mm, Ms, Radians, VertexIndex } from './units';
 export {
   decodeVertex,
+  EVENTS,
   FEATURES,
   type FeatureName,
   FLAGS,
