@@ -14,12 +14,18 @@ export interface BoxMm {
   readonly max: Vec3;
 }
 
+export type Projection = 'perspective' | 'orthographic';
+/** Where one may look from at a press of a button. */
+export type CameraPreset = 'top' | 'front' | 'left' | 'right' | 'back' | 'iso';
+
 export interface CameraState {
   /** What the camera looks at and turns around. */
   readonly targetMm: Vec3;
   readonly distanceMm: Mm;
   readonly azimuth: Radians;
   readonly elevation: Radians;
+  /** With either, a length in the target's plane looks the same. */
+  readonly projection: Projection;
 }
 
 export interface ViewSize {
@@ -52,6 +58,21 @@ export const DEFAULT_CAMERA: CameraState = {
   distanceMm: 400,
   azimuth: (-28 * Math.PI) / 180,
   elevation: (32 * Math.PI) / 180,
+  projection: 'perspective',
+};
+
+/** Without perspective the eye stands this far away, so that all lines of sight are nearly parallel. */
+export const ORTHOGRAPHIC_EYE_MM: Mm = 10_000;
+
+const QUARTER: Radians = Math.PI / 2;
+
+export const PRESETS: Readonly<Record<CameraPreset, Pick<CameraState, 'azimuth' | 'elevation'>>> = {
+  top: { azimuth: 0, elevation: ELEVATION_MAX },
+  front: { azimuth: 0, elevation: 0 },
+  left: { azimuth: -QUARTER, elevation: 0 },
+  right: { azimuth: QUARTER, elevation: 0 },
+  back: { azimuth: Math.PI, elevation: 0 },
+  iso: { azimuth: -QUARTER / 2, elevation: Math.atan(Math.SQRT1_2) },
 };
 
 const clamp = (value: number, min: number, max: number): number => Math.min(Math.max(value, min), max);
@@ -66,6 +87,10 @@ const along = (from: Vec3, ...terms: readonly (readonly [number, Vec3])[]): Vec3
   return sum;
 };
 
+/** From the eye to the target. */
+export const eyeDistanceMm = ({ projection, distanceMm }: CameraState): Mm =>
+  projection === 'perspective' ? distanceMm : ORTHOGRAPHIC_EYE_MM;
+
 export function eyeFrame(camera: CameraState): EyeFrame {
   const [sinA, cosA] = [Math.sin(camera.azimuth), Math.cos(camera.azimuth)];
   const [sinE, cosE] = [Math.sin(camera.elevation), Math.cos(camera.elevation)];
@@ -74,7 +99,7 @@ export function eyeFrame(camera: CameraState): EyeFrame {
     forward,
     right: [cosA, sinA, 0],
     up: [-sinA * sinE, cosA * sinE, cosE],
-    eyeMm: along(camera.targetMm, [-camera.distanceMm, forward]),
+    eyeMm: along(camera.targetMm, [-eyeDistanceMm(camera), forward]),
   };
 }
 
@@ -148,7 +173,7 @@ export function fit(camera: CameraState, box: BoxMm, size: ViewSize): CameraStat
   let distance = DISTANCE_MIN_MM;
   for (const corner of corners(box)) {
     const from = along(corner, [-1, targetMm]);
-    const depth = dot(from, forward);
+    const depth = camera.projection === 'perspective' ? dot(from, forward) : 0;
     distance = Math.max(
       distance,
       Math.abs(dot(from, right)) / tanH - depth,
@@ -162,6 +187,10 @@ export function fit(camera: CameraState, box: BoxMm, size: ViewSize): CameraStat
 export function clipPlanes(camera: CameraState, box: BoxMm): { readonly nearMm: Mm; readonly farMm: Mm } {
   const { eyeMm, forward } = eyeFrame(camera);
   const depths = corners(box).map((corner) => dot(along(corner, [-1, eyeMm]), forward));
+  if (camera.projection === 'orthographic') {
+    // Depth is linear here: a plane behind the eye is as good as one before it.
+    return { nearMm: Math.min(...depths) - 1, farMm: Math.max(...depths) + 1 };
+  }
   const farMm = Math.max(Math.max(...depths) * 1.01, 1);
   const nearMm = Math.max(Math.min(...depths) * 0.99, farMm / DEPTH_RATIO_MAX);
   return { nearMm, farMm };

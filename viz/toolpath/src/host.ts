@@ -5,13 +5,16 @@
  */
 
 import type { Bed } from './bed';
-import type { CameraState, Vec3 } from './camera';
+import type { BoxMm, CameraPreset, CameraState, Projection, Vec3 } from './camera';
+import type { ColourMode, ValueRange } from './colours';
 import type { Layer } from './layers';
 import { carryOut, type ViewEvent, type ViewRequest, type WorkerRequest } from './messages';
 import type { Theme } from './palette';
+import type { Shown } from './shown';
+import type { BedMesh } from './surface';
 import type { CssPx, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
-import type { Shown, ToolpathView, ViewSizePx } from './view';
+import type { PictureSizePx, ToolpathView, ViewSizePx } from './view';
 
 export interface ToolpathHostOptions {
   readonly size: ViewSizePx;
@@ -61,6 +64,11 @@ export class ToolpathHost {
     const whole = vertices.byteLength === vertices.buffer.byteLength;
     this.send({ type: 'append', vertices }, whole ? [vertices.buffer] : []);
   }
+  /** Planner channels of the next vertices that have none yet, four words each; memory as with {@link append}. */
+  appendChannels(words: Uint32Array<ArrayBuffer>): void {
+    const whole = words.byteLength === words.buffer.byteLength;
+    this.send({ type: 'appendChannels', words }, whole ? [words.buffer] : []);
+  }
   end(): void {
     this.send({ type: 'end' });
   }
@@ -73,11 +81,41 @@ export class ToolpathHost {
   show(shown: Partial<Shown>): void {
     this.send({ type: 'show', shown });
   }
+  setColour(mode: ColourMode): void {
+    this.send({ type: 'setColour', mode });
+  }
+  /** The user's own limits of a mode's colours; null: those found in the file. */
+  setColourRange(mode: ColourMode, range: ValueRange | null): void {
+    this.send({ type: 'setColourRange', mode, range });
+  }
   setPrintedUpTo(vertex: VertexIndex | null): void {
     this.send({ type: 'setPrintedUpTo', vertex });
   }
   setNozzle(at: Vec3 | null): void {
     this.send({ type: 'setNozzle', at });
+  }
+  /** Marks the segment that ends at this vertex; null marks none. */
+  setHighlight(vertex: VertexIndex | null): void {
+    this.send({ type: 'setHighlight', vertex });
+  }
+  /** Lets one object stand out; null: none. */
+  setHighlightedObject(object: number | null): void {
+    this.send({ type: 'setHighlightedObject', object });
+  }
+  /** What lies outside gets a warning's tint; null: there are no limits. */
+  setVolume(box: BoxMm | null): void {
+    this.send({ type: 'setVolume', box });
+  }
+  setMesh(mesh: BedMesh | null): void {
+    this.send({ type: 'setMesh', mesh });
+  }
+  /** Asks what is drawn at a point, from the view's left top; the answer is the event `picked` with this id. */
+  pick(x: CssPx, y: CssPx, id: number): void {
+    this.send({ type: 'pick', x, y, id });
+  }
+  /** Asks for a picture in full detail; the answer is the event `picture` with this id. */
+  picture(id: number, size: PictureSizePx): void {
+    this.send({ type: 'picture', id, size });
   }
   setTheme(theme: Theme): void {
     this.send({ type: 'setTheme', theme });
@@ -93,6 +131,13 @@ export class ToolpathHost {
   }
   fit(direction?: Pick<CameraState, 'azimuth' | 'elevation'>): void {
     this.send(direction ? { type: 'fit', direction } : { type: 'fit' });
+  }
+  /** Looks at the whole part from there. */
+  setCamera(preset: CameraPreset): void {
+    this.send({ type: 'setCamera', preset });
+  }
+  setProjection(projection: Projection): void {
+    this.send({ type: 'setProjection', projection });
   }
   resize(size: ViewSizePx): void {
     this.send({ type: 'resize', size });
@@ -122,11 +167,7 @@ export class ToolpathHost {
       // Loaded only where it is needed: three.js is otherwise in the worker alone.
       const { ToolpathView } = await import('./view');
       if (this.#disposed) return;
-      this.#view = new ToolpathView(canvas, size, {
-        onFrame: (report) => this.#onEvent({ type: 'frame', report }),
-        onContextLost: () => this.#onEvent({ type: 'contextLost' }),
-        onContextRestored: () => this.#onEvent({ type: 'contextRestored' }),
-      });
+      this.#view = new ToolpathView(canvas, size, this.#onEvent);
       this.#onEvent({ type: 'ready' });
       for (const request of this.#waiting) carryOut(this.#view, request);
     } catch (error) {

@@ -1,12 +1,24 @@
 /** The package's face: what a page may use. The view itself (three.js) is reached through the host, or `./view`. */
 export type { Bed } from './bed';
-export type { BoxMm, CameraState } from './camera';
+export type { BoxMm, CameraPreset, CameraState, Projection } from './camera';
+export {
+  CATEGORICAL_MODES,
+  COLOUR_MODES,
+  type ColourMode,
+  type ColourRanges,
+  categoryColour,
+  PLANNED_MODES,
+  RAMP,
+  type ValueRange,
+} from './colours';
 export { attachControls } from './controls';
 export type { FrameReport } from './frames';
 export { ToolpathHost, type ToolpathHostOptions } from './host';
 export type { Layer } from './layers';
 export type { ViewEvent, ViewRequest } from './messages';
 export { type HexColour, PALETTES, type Palette, type Theme } from './palette';
+export type { Shown } from './shown';
+export type { BedMesh } from './surface';
 export type { CssPx, LayerIndex, Mm, Ms, Radians, VertexIndex } from './units';
 export {
   decodeVertex,
@@ -18,4 +30,4 @@ export {
   type VertexHeader,
   WORDS_PER_VERTEX,
 } from './vertex';
-export type { Shown, ToolpathView, ViewSizePx } from './view';
+export type { PictureSizePx, ToolpathView, ViewSizePx } from './view';

@@ -10,6 +10,8 @@ export interface Layer {
   readonly firstVertex: VertexIndex;
   /** Height of the layer's top. */
   readonly zMm: Mm;
+  /** How long it takes, s; left out where that is not known. */
+  readonly timeS?: number;
 }
 
 /** Vertices `first … end − 1`. */

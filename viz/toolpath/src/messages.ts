@@ -5,29 +5,43 @@
  * worker that makes vertices), so that they do not pass through the main thread.
  */
 import type { Bed } from './bed';
-import type { CameraState, Vec3 } from './camera';
+import type { BoxMm, CameraPreset, CameraState, Projection, Vec3 } from './camera';
+import type { ColourMode, ColourRanges, ValueRange } from './colours';
 import type { FrameReport } from './frames';
 import type { Layer } from './layers';
 import type { Theme } from './palette';
+import type { Shown } from './shown';
+import type { BedMesh } from './surface';
 import type { CssPx, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
-import type { Shown, ToolpathView, ViewSizePx } from './view';
+import type { PictureSizePx, ToolpathView, ViewSizePx } from './view';
 
 export type ViewRequest =
   | { readonly type: 'setBed'; readonly bed: Bed | null }
   | { readonly type: 'begin'; readonly header: VertexHeader }
   | { readonly type: 'append'; readonly vertices: Uint32Array }
+  | { readonly type: 'appendChannels'; readonly words: Uint32Array }
   | { readonly type: 'end' }
   | { readonly type: 'clear' }
   | { readonly type: 'setLayers'; readonly layers: readonly Layer[] }
   | { readonly type: 'show'; readonly shown: Partial<Shown> }
+  | { readonly type: 'setColour'; readonly mode: ColourMode }
+  | { readonly type: 'setColourRange'; readonly mode: ColourMode; readonly range: ValueRange | null }
   | { readonly type: 'setPrintedUpTo'; readonly vertex: VertexIndex | null }
   | { readonly type: 'setNozzle'; readonly at: Vec3 | null }
+  | { readonly type: 'setHighlight'; readonly vertex: VertexIndex | null }
+  | { readonly type: 'setHighlightedObject'; readonly object: number | null }
+  | { readonly type: 'setVolume'; readonly box: BoxMm | null }
+  | { readonly type: 'setMesh'; readonly mesh: BedMesh | null }
+  | { readonly type: 'pick'; readonly x: CssPx; readonly y: CssPx; readonly id: number }
+  | { readonly type: 'picture'; readonly id: number; readonly size: PictureSizePx }
   | { readonly type: 'setTheme'; readonly theme: Theme }
   | { readonly type: 'orbit'; readonly dx: CssPx; readonly dy: CssPx }
   | { readonly type: 'pan'; readonly dx: CssPx; readonly dy: CssPx }
   | { readonly type: 'zoom'; readonly factor: number; readonly at: readonly [CssPx, CssPx] }
   | { readonly type: 'fit'; readonly direction?: Pick<CameraState, 'azimuth' | 'elevation'> }
+  | { readonly type: 'setCamera'; readonly preset: CameraPreset }
+  | { readonly type: 'setProjection'; readonly projection: Projection }
   | { readonly type: 'resize'; readonly size: ViewSizePx };
 
 /** What only the worker itself understands. */
@@ -41,6 +55,11 @@ export type ViewEvent =
   /** No picture can be drawn; the reason is the browser's. */
   | { readonly type: 'failed'; readonly reason: string }
   | { readonly type: 'frame'; readonly report: FrameReport }
+  /** What was found up to now, a few times a second while data come; `isWhole`: nothing is missing any more. */
+  | { readonly type: 'ranges'; readonly ranges: ColourRanges; readonly isWhole: boolean }
+  | { readonly type: 'picked'; readonly id: number; readonly vertex: VertexIndex | null }
+  /** A PNG; null where none could be made. */
+  | { readonly type: 'picture'; readonly id: number; readonly blob: Blob | null }
   | { readonly type: 'contextLost' }
   | { readonly type: 'contextRestored' };
 
@@ -53,6 +72,8 @@ export function carryOut(view: ToolpathView, request: ViewRequest): void {
       return view.begin(request.header);
     case 'append':
       return view.append(request.vertices);
+    case 'appendChannels':
+      return view.appendChannels(request.words);
     case 'end':
       return view.end();
     case 'clear':
@@ -61,10 +82,26 @@ export function carryOut(view: ToolpathView, request: ViewRequest): void {
       return view.setLayers(request.layers);
     case 'show':
       return view.show(request.shown);
+    case 'setColour':
+      return view.setColour(request.mode);
+    case 'setColourRange':
+      return view.setColourRange(request.mode, request.range);
     case 'setPrintedUpTo':
       return view.setPrintedUpTo(request.vertex);
     case 'setNozzle':
       return view.setNozzle(request.at);
+    case 'setHighlight':
+      return view.setHighlight(request.vertex);
+    case 'setHighlightedObject':
+      return view.setHighlightedObject(request.object);
+    case 'setVolume':
+      return view.setVolume(request.box);
+    case 'setMesh':
+      return view.setMesh(request.mesh);
+    case 'pick':
+      return view.pick(request.x, request.y, request.id);
+    case 'picture':
+      return view.picture(request.id, request.size);
     case 'setTheme':
       return view.setTheme(request.theme);
     case 'orbit':
@@ -75,6 +112,10 @@ export function carryOut(view: ToolpathView, request: ViewRequest): void {
       return view.zoom(request.factor, request.at);
     case 'fit':
       return view.fit(request.direction);
+    case 'setCamera':
+      return view.setCamera(request.preset);
+    case 'setProjection':
+      return view.setProjection(request.projection);
     case 'resize':
       return view.resize(request.size);
   }

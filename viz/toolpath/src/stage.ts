@@ -13,6 +13,7 @@ import {
   Matrix4,
   Mesh,
   type Object3D,
+  OrthographicCamera,
   PerspectiveCamera,
   RawShaderMaterial,
   Scene,
@@ -20,7 +21,16 @@ import {
   WebGLRenderer,
   WebGLRenderTarget,
 } from 'three';
-import { type BoxMm, type CameraState, clipPlanes, eyeFrame, FIELD_OF_VIEW, type ViewSize } from './camera';
+import {
+  type BoxMm,
+  type CameraState,
+  clipPlanes,
+  eyeDistanceMm,
+  eyeFrame,
+  FIELD_OF_VIEW,
+  mmPerPx,
+  type ViewSize,
+} from './camera';
 import type { HexColour } from './palette';
 import { rgb } from './palette';
 import { COPY_FRAGMENT, COPY_VERTEX } from './shaders';
@@ -35,7 +45,9 @@ export type Surface = 'canvas' | 'picture';
 
 export class Stage {
   readonly renderer: WebGLRenderer;
-  readonly #camera = new PerspectiveCamera();
+  readonly #perspective = new PerspectiveCamera();
+  readonly #orthographic = new OrthographicCamera();
+  #camera: PerspectiveCamera | OrthographicCamera = this.#perspective;
   readonly #picture: WebGLRenderTarget;
   readonly #copy: Mesh<BufferGeometry, RawShaderMaterial>;
   readonly #copyScene = new Scene();
@@ -73,7 +85,7 @@ export class Stage {
     this.#copy.geometry.setDrawRange(0, 3);
     this.#copy.frustumCulled = false;
     this.#copyScene.add(this.#copy);
-    this.#camera.matrixAutoUpdate = false;
+    for (const camera of [this.#perspective, this.#orthographic]) camera.matrixAutoUpdate = false;
   }
 
   get size(): ViewSize {
@@ -101,30 +113,23 @@ export class Stage {
     this.renderer.setClearColor(new Color().setRGB(r, g, b, LinearSRGBColorSpace), 1);
   }
 
-  look(camera: CameraState, around: BoxMm): void {
-    const { eyeMm, right, up, forward } = eyeFrame(camera);
+  /** Sets the camera for a surface of this size; the view's own where it is left out. */
+  look(camera: CameraState, around: BoxMm, size: ViewSize = this.#size): void {
     const { nearMm, farMm } = clipPlanes(camera, around);
-    const view = this.#camera;
-    view.fov = (FIELD_OF_VIEW * 180) / Math.PI;
-    view.aspect = this.#size.width / this.#size.height;
-    view.near = nearMm;
-    view.far = farMm;
-    view.updateProjectionMatrix();
-    view.matrix.copy(
-      new Matrix4().set(
-        ...([0, 1, 2].flatMap((axis) => [
-          right[axis] ?? 0,
-          up[axis] ?? 0,
-          -(forward[axis] ?? 0),
-          eyeMm[axis] ?? 0,
-        ]) as Row3),
-        0,
-        0,
-        0,
-        1,
-      ),
-    );
-    view.matrixWorldNeedsUpdate = true;
+    this.#camera = camera.projection === 'perspective' ? this.#perspective : this.#orthographic;
+    if (camera.projection === 'perspective') {
+      this.#perspective.fov = (FIELD_OF_VIEW * 180) / Math.PI;
+      this.#perspective.aspect = size.width / size.height;
+    } else {
+      const half = (mmPerPx(camera, size) * size.height) / 2;
+      const halfWidth = (half * size.width) / size.height;
+      Object.assign(this.#orthographic, { left: -halfWidth, right: halfWidth, top: half, bottom: -half });
+    }
+    this.#camera.near = nearMm;
+    this.#camera.far = farMm;
+    this.#camera.updateProjectionMatrix();
+    this.#camera.matrix.copy(placeOf(camera));
+    this.#camera.matrixWorldNeedsUpdate = true;
   }
 
   clear(surface: Surface): void {
@@ -179,6 +184,22 @@ export class Stage {
   #aim(surface: Surface): void {
     this.renderer.setRenderTarget(surface === 'picture' ? this.#picture : null);
   }
+}
+
+/** What a CSS pixel covers a millimetre away from the eye. */
+export const pixelAngle = (camera: CameraState, size: ViewSize): number =>
+  mmPerPx(camera, size) / eyeDistanceMm(camera);
+
+/** The eye's axes and place. */
+function placeOf(camera: CameraState): Matrix4 {
+  const { eyeMm, right, up, forward } = eyeFrame(camera);
+  const rows = [0, 1, 2].flatMap((axis) => [
+    right[axis] ?? 0,
+    up[axis] ?? 0,
+    -(forward[axis] ?? 0),
+    eyeMm[axis] ?? 0,
+  ]);
+  return new Matrix4().set(...(rows as Row3), 0, 0, 0, 1);
 }
 
 type Row3 = [number, number, number, number, number, number, number, number, number, number, number, number];

@@ -33,13 +33,14 @@ export const FLAGS = {
   unretract: 1 << 28,
   seam: 1 << 29,
   wipe: 1 << 30,
+  pause: 2 ** 31,
 } as const;
 
 /** Bits of word 1: what happens where the segment ends. */
 export const EVENTS = {
-  toolChange: 2 ** 29,
-  pause: 2 ** 30,
-  filamentChange: 2 ** 31,
+  toolChange: 1 << 29,
+  /** A pause for it; `FLAGS.pause` is set too. */
+  filamentChange: 1 << 30,
 } as const;
 
 /** Millimetres of one unit of `width` and `height`. */
@@ -89,16 +90,16 @@ export interface Vertex {
   readonly feature: FeatureName;
   readonly layer: number;
   readonly tool: number;
+  /** 0: belongs to none; 255: to one beyond the 254 that are told apart. */
+  readonly object: number;
   readonly travel: boolean;
   readonly break: boolean;
   readonly retract: boolean;
   readonly unretract: boolean;
   readonly seam: boolean;
   readonly wipe: boolean;
-  /** 0: none. */
-  readonly object: number;
-  readonly toolChange: boolean;
   readonly pause: boolean;
+  readonly toolChange: boolean;
   readonly filamentChange: boolean;
 }
 
@@ -144,15 +145,15 @@ export function decodeVertex(header: VertexHeader, words: Uint32Array, index: Ve
     feature: featureName(field(words, index, 'feature')),
     layer: field(words, index, 'layer'),
     tool: field(words, index, 'tool'),
+    object: field(words, index, 'object'),
     travel: hasFlag(words, index, FLAGS.travel),
     break: hasFlag(words, index, FLAGS.break),
     retract: hasFlag(words, index, FLAGS.retract),
     unretract: hasFlag(words, index, FLAGS.unretract),
     seam: hasFlag(words, index, FLAGS.seam),
     wipe: hasFlag(words, index, FLAGS.wipe),
-    object: field(words, index, 'object'),
+    pause: hasFlag(words, index, FLAGS.pause),
     toolChange: hasEvent(words, index, EVENTS.toolChange),
-    pause: hasEvent(words, index, EVENTS.pause),
     filamentChange: hasEvent(words, index, EVENTS.filamentChange),
   };
 }
@@ -165,9 +166,9 @@ export interface VertexInput {
   readonly feature?: FeatureName;
   readonly layer?: number;
   readonly tool?: number;
+  readonly object?: number;
   /** Any of {@link FLAGS}, or-ed. */
   readonly flags?: number;
-  readonly object?: number;
   /** Any of {@link EVENTS}, or-ed. */
   readonly events?: number;
 }

@@ -9,11 +9,13 @@ import { Scene } from 'three';
 import { type Bed, BedObjects, bedBox, isBed } from './bed';
 import {
   type BoxMm,
+  type CameraPreset,
   type CameraState,
   DEFAULT_CAMERA,
-  FIELD_OF_VIEW,
   fit,
   orbit,
+  PRESETS,
+  type Projection,
   pan,
   unionOf,
   type Vec3,
@@ -21,27 +23,18 @@ import {
 } from './camera';
 import { VertexStore } from './chunks';
 import { Rough } from './coarse';
-import { type Drawn, FrameLoop, type FrameReport, type Painter, realmClock } from './frames';
+import type { ColourMode, ColourRanges, ValueRange } from './colours';
+import { type Drawn, FrameLoop, type Painter, realmClock } from './frames';
 import { type Layer, LayerList, type VertexRange } from './layers';
+import type { ViewEvent } from './messages';
 import { NozzleObject } from './nozzle';
 import { featureMask, PALETTES, type Palette, type Theme } from './palette';
 import { ALL_PRINTED, PathObjects } from './path';
-import { Stage, type Surface } from './stage';
-import type { CssPx, LayerIndex, Ms, VertexIndex } from './units';
-import { type FeatureName, FLAGS, type VertexHeader } from './vertex';
-
-/** What is drawn of the file; {@link ToolpathView.show} changes the members that are given. */
-export interface Shown {
-  /** Both included. */
-  readonly layerFrom: LayerIndex;
-  readonly layerTo: LayerIndex;
-  /** The last vertex of the range that is drawn; null: up to the end of `layerTo`. */
-  readonly vertexTo: VertexIndex | null;
-  readonly travel: boolean;
-  readonly retractions: boolean;
-  readonly seams: boolean;
-  readonly hiddenFeatures: readonly FeatureName[];
-}
+import { SHOW_ALL, type Shown, validRange } from './shown';
+import { pixelAngle, Stage, type Surface } from './stage';
+import { type BedMesh, isMesh } from './surface';
+import type { CssPx, Ms, VertexIndex } from './units';
+import { FLAGS, type VertexHeader } from './vertex';
 
 export interface ViewSizePx {
   readonly width: CssPx;
@@ -50,22 +43,12 @@ export interface ViewSizePx {
   readonly ratio: number;
 }
 
-/** What the view tells of itself. */
-export interface ViewEvents {
-  onFrame?(report: FrameReport): void;
-  onContextLost?(): void;
-  onContextRestored?(): void;
+/** Of a picture that is kept. */
+export interface PictureSizePx {
+  readonly width: number;
+  readonly height: number;
 }
 
-const SHOW_ALL: Shown = {
-  layerFrom: 0,
-  layerTo: Number.MAX_SAFE_INTEGER,
-  vertexTo: null,
-  travel: false,
-  retractions: false,
-  seams: false,
-  hiddenFeatures: [],
-};
 /** While vertices arrive, the picture follows this often. */
 const GROWTH_FRAME_MS: Ms = 200;
 /** Where a full picture takes longer, the next ones do without several samples a pixel. */
@@ -83,7 +66,7 @@ interface Progress {
 
 export class ToolpathView {
   readonly #canvas: HTMLCanvasElement | OffscreenCanvas;
-  readonly #events: ViewEvents;
+  readonly #tell: (event: ViewEvent) => void;
   readonly #stage: Stage;
   readonly #fine = new PathObjects('whole');
   /** For pictures in motion. */
@@ -103,10 +86,20 @@ export class ToolpathView {
   #progress: Progress = { phase: 'done', at: 0, printed: ALL_PRINTED };
   #grown: Ms = 0;
   #smooth = true;
+  #mode: ColourMode = 'feature';
+  #limits: ColourRanges = {};
+  #highlight: VertexIndex | null = null;
+  #object: number | null = null;
+  #volume: BoxMm | null = null;
+  #mesh: BedMesh | null = null;
 
-  constructor(canvas: HTMLCanvasElement | OffscreenCanvas, size: ViewSizePx, events: ViewEvents = {}) {
+  constructor(
+    canvas: HTMLCanvasElement | OffscreenCanvas,
+    size: ViewSizePx,
+    tell: (event: ViewEvent) => void,
+  ) {
     this.#canvas = canvas;
-    this.#events = events;
+    this.#tell = tell;
     this.#stage = new Stage(canvas);
     this.#bedScene.add(this.#bedObjects.group);
     this.#bedScene.matrixWorldAutoUpdate = false;
@@ -115,7 +108,7 @@ export class ToolpathView {
     this.#loop = new FrameLoop(this.#painter(), realmClock(), (report) => {
       // Once too slow, it stays so: the next picture of this size is no cheaper.
       if (report.kind === 'full' && report.totalMs > SMOOTH_MAX_MS) this.#smooth = false;
-      events.onFrame?.(report);
+      tell({ type: 'frame', report });
     });
     this.setTheme('light');
     this.resize(size);
@@ -145,7 +138,13 @@ export class ToolpathView {
     this.#rough = new Rough(header);
     for (const path of [this.#fine, this.#coarse]) path.header = header;
     this.#printed = ALL_PRINTED;
-    this.#shown = { ...this.#shown, layerFrom: 0, layerTo: SHOW_ALL.layerTo, vertexTo: null };
+    this.#shown = {
+      ...this.#shown,
+      layerFrom: 0,
+      layerTo: SHOW_ALL.layerTo,
+      vertexFrom: null,
+      vertexTo: null,
+    };
     this.#grown = performance.now();
     this.#loop.moved();
   }
@@ -159,6 +158,12 @@ export class ToolpathView {
     if (now - this.#grown < GROWTH_FRAME_MS) return;
     this.#grown = now;
     this.#loop.moved();
+  }
+
+  /** Planner channels of the next vertices that have none yet, four words each; the array is copied. */
+  appendChannels(_words: Uint32Array): void {
+    if (!this.#store) return;
+    this.#tell({ type: 'ranges', ranges: {}, isWhole: false });
   }
 
   /** The file has no more vertices. */
@@ -183,6 +188,19 @@ export class ToolpathView {
     this.#loop.moved();
   }
 
+  setColour(mode: ColourMode): void {
+    this.#mode = mode;
+    this.#loop.moved();
+  }
+
+  /** The user's own limits of a mode's colours; null: those found in the file. */
+  setColourRange(mode: ColourMode, range: ValueRange | null): void {
+    const { [mode]: _, ...others } = this.#limits;
+    const valid = validRange(mode, range);
+    this.#limits = valid ? { ...others, [mode]: valid } : others;
+    if (mode === this.#mode) this.#loop.moved();
+  }
+
   /** Vertices before this one are printed, the others still to come; null: no difference is shown. */
   setPrintedUpTo(vertex: VertexIndex | null): void {
     const printed = vertex === null ? ALL_PRINTED : Math.min(Math.max(Math.floor(vertex), 0), ALL_PRINTED);
@@ -197,6 +215,40 @@ export class ToolpathView {
     if (place === null && !this.#nozzle.isShown) return;
     this.#nozzle.at = place;
     this.#loop.overlaid();
+  }
+
+  /** Marks the segment that ends at this vertex; null marks none. */
+  setHighlight(vertex: VertexIndex | null): void {
+    if (this.#highlight === vertex) return;
+    this.#highlight = vertex;
+    this.#loop.overlaid();
+  }
+
+  /** Lets one object stand out; null: none. */
+  setHighlightedObject(object: number | null): void {
+    if (this.#object === object) return;
+    this.#object = object;
+    this.#loop.moved();
+  }
+
+  /** What lies outside gets a warning's tint; null: there are no limits. */
+  setVolume(box: BoxMm | null): void {
+    this.#volume = box && [...box.min, ...box.max].some(Number.isNaN) ? null : box;
+    if (this.#store && this.#volume !== box) this.#loop.moved();
+  }
+
+  setMesh(mesh: BedMesh | null): void {
+    this.#mesh = mesh && isMesh(mesh) ? mesh : null;
+    if (this.#mesh !== mesh) this.#loop.moved();
+  }
+
+  /** What is drawn at a point, from the view's left top. */
+  pick(_x: CssPx, _y: CssPx, id: number): void {
+    this.#tell({ type: 'picked', id, vertex: null });
+  }
+
+  picture(id: number, _size: PictureSizePx): void {
+    this.#tell({ type: 'picture', id, blob: null });
   }
 
   setTheme(theme: Theme): void {
@@ -227,12 +279,18 @@ export class ToolpathView {
     this.#move(fit(from, this.#store?.box() ?? this.#bedBox() ?? EMPTY_BOX, this.#stage.size));
   }
 
+  /** Looks at the whole part from there. */
+  setCamera(preset: CameraPreset): void {
+    this.fit(PRESETS[preset]);
+  }
+
+  setProjection(projection: Projection): void {
+    this.#move({ ...this.#camera, projection });
+  }
+
   resize({ width, height, ratio }: ViewSizePx): void {
     this.#smooth = true;
     this.#stage.resize(width, height, ratio);
-    const angle = (2 * Math.tan(FIELD_OF_VIEW / 2)) / (this.#stage.size.height * this.#stage.ratio);
-    for (const path of [this.#fine, this.#coarse]) path.setPixels(angle, this.#stage.ratio);
-    this.#nozzle.pixelAngle = angle * this.#stage.ratio;
     this.#loop.moved();
   }
 
@@ -254,7 +312,7 @@ export class ToolpathView {
     this.#bedObjects.clear();
     this.#nozzle.release();
     this.#stage.lost();
-    this.#events.onContextLost?.();
+    this.#tell({ type: 'contextLost' });
   };
 
   readonly #onRestored = (): void => {
@@ -262,7 +320,7 @@ export class ToolpathView {
     this.#bedObjects.palette = this.#palette;
     this.#stage.background = this.#palette.background;
     this.#loop.resume();
-    this.#events.onContextRestored?.();
+    this.#tell({ type: 'contextRestored' });
   };
 
   #move(camera: CameraState): void {
@@ -293,6 +351,10 @@ export class ToolpathView {
   #prepare(surface: Surface): void {
     const box = unionOf(this.#bedBox(), this.#store?.boxOfAll() ?? null);
     this.#stage.look(this.#camera, box ?? EMPTY_BOX);
+    const angle = pixelAngle(this.#camera, this.#stage.size);
+    for (const path of [this.#fine, this.#coarse])
+      path.setPixels(angle / this.#stage.ratio, this.#stage.ratio);
+    this.#nozzle.pixelAngle = angle;
     this.#stage.clear(surface);
     this.#stage.draw(surface, this.#bedScene);
   }

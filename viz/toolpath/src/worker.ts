@@ -18,11 +18,7 @@ let view: ToolpathView | null = null;
 
 function start(request: Extract<WorkerRequest, { type: 'start' }>): void {
   try {
-    view = new ToolpathView(request.canvas, request.size, {
-      onFrame: (report) => scope.postMessage({ type: 'frame', report }),
-      onContextLost: () => scope.postMessage({ type: 'contextLost' }),
-      onContextRestored: () => scope.postMessage({ type: 'contextRestored' }),
-    });
+    view = new ToolpathView(request.canvas, request.size, (event) => scope.postMessage(event));
     scope.postMessage({ type: 'ready' });
   } catch (error) {
     scope.postMessage({ type: 'failed', reason: error instanceof Error ? error.message : String(error) });

@@ -4,7 +4,10 @@ import {
   DEFAULT_CAMERA,
   eyeFrame,
   fit as fitted,
+  mmPerPx,
+  ORTHOGRAPHIC_EYE_MM,
   orbit,
+  PRESETS,
   pan,
   type Vec3,
   zoom,
@@ -92,5 +95,32 @@ describe('the camera', () => {
     const depth = dot([60 - eyeMm[0], 55 - eyeMm[1], 20 - eyeMm[2]], forward);
     expect(depth).toBeGreaterThan(nearMm);
     expect(depth).toBeLessThan(farMm);
+  });
+});
+
+describe('presets and projections', () => {
+  test.each([
+    ['front', [0, 1, 0]],
+    ['back', [0, -1, 0]],
+    ['left', [1, 0, 0]],
+    ['right', [-1, 0, 0]],
+    ['top', [0, 0, -1]],
+  ] as const)('%s looks along %j', (preset, way) => {
+    const { forward } = eyeFrame({ ...DEFAULT_CAMERA, ...PRESETS[preset] });
+    for (const axis of [0, 1, 2] as const) expect(Math.abs(forward[axis] - way[axis])).toBeLessThan(0.01);
+  });
+
+  test.each(['perspective', 'orthographic'] as const)('%s: the box fits, and not loosely', (projection) => {
+    const camera = fitted({ ...DEFAULT_CAMERA, ...PRESETS.front, projection }, BOX, SIZE);
+    const covered = 100 / (mmPerPx(camera, SIZE) * SIZE.width);
+    expect(covered).toBeLessThan(1);
+    expect(covered).toBeGreaterThan(projection === 'perspective' ? 0.7 : 0.9);
+  });
+
+  test('without perspective the box lies between the planes, however near the target is', () => {
+    const camera = { ...fitted({ ...DEFAULT_CAMERA, projection: 'orthographic' }, BOX, SIZE), distanceMm: 2 };
+    const { nearMm, farMm } = clipPlanes(camera, BOX);
+    expect(nearMm).toBeLessThan(ORTHOGRAPHIC_EYE_MM - 40);
+    expect(farMm).toBeGreaterThan(ORTHOGRAPHIC_EYE_MM + 40);
   });
 });

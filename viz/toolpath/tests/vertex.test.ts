@@ -4,7 +4,7 @@ import { decodeVertex, EVENTS, encodeVertex, FEATURES, FIELDS, FLAGS, featureNum
 const HEADER = { originMm: [-10, -20, 0], stepMm: 2 ** -10 } as const;
 /** The test vector of docs/vertex.md. */
 const VECTOR = new Uint32Array([0x06e05a00, 0x0320c900, 0x20100133, 0x00100007]);
-const EVENTFUL = new Uint32Array([0x06e05a00, 0xa320c900, 0x20100133, 0x03100007]);
+const EVENTFUL = new Uint32Array([0x06e05a00, 0x6320c900, 0x20100133, 0x03100007]);
 
 const VERTEX = {
   positionMm: [12.5, 30.25, 0.3],

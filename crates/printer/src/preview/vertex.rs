@@ -42,14 +42,14 @@ impl Flags {
     pub const SEAM: Self = Self(1 << 29);
     /// A travel over what was just printed.
     pub const WIPE: Self = Self(1 << 30);
-    /// Another tool is taken, at the place where the segment ends.
+    /// The file waits for the user where the segment ends.
+    pub const PAUSE: Self = Self(1 << 31);
+    /// Another tool is taken there.
     pub const TOOL_CHANGE: Self = Self(1);
-    /// The file waits for the user there.
-    pub const PAUSE: Self = Self(1 << 1);
-    /// It does, so that the filament is changed.
-    pub const FILAMENT_CHANGE: Self = Self(1 << 2);
-    const OF_SEGMENT: u32 = 63 << 25;
-    const EVENTS: u32 = 7;
+    /// The pause is for a change of filament.
+    pub const FILAMENT_CHANGE: Self = Self(1 << 1);
+    const OF_SEGMENT: u32 = 127 << 25;
+    const EVENTS: u32 = 3;
 
     /// Both.
     #[must_use]
@@ -144,7 +144,7 @@ impl Vertex {
             width: a >> SIZE_SHIFT & WIDTH_MAX,
             height: b >> SIZE_SHIFT & HEIGHT_MAX,
             feature: (c >> FEATURE_SHIFT & FEATURE_MASK) as u8,
-            flags: Flags(c & Flags::OF_SEGMENT | b >> EVENT_SHIFT),
+            flags: Flags(c & Flags::OF_SEGMENT | b >> EVENT_SHIFT & Flags::EVENTS),
             layer: d & LAYER_MAX,
             tool: d >> TOOL_SHIFT & TOOL_MAX,
             object: (d >> OBJECT_SHIFT) as u8,
@@ -227,18 +227,25 @@ mod tests {
         assert_eq!(vertex.pack(), [0x06E0_5A00, 0x0320_C900, 0x2010_0133, 0x0010_0007]);
         let events = Flags::TOOL_CHANGE.and(Flags::FILAMENT_CHANGE);
         let vertex = Vertex { flags: vertex.flags.and(events), object: 3, ..vertex };
-        assert_eq!(vertex.pack(), [0x06E0_5A00, 0xA320_C900, 0x2010_0133, 0x0310_0007]);
+        assert_eq!(vertex.pack(), [0x06E0_5A00, 0x6320_C900, 0x2010_0133, 0x0310_0007]);
     }
 
     #[test]
     fn every_flag_has_its_own_bit() {
-        let flags = [Flags::TRAVEL, Flags::BREAK, Flags::RETRACT, Flags::UNRETRACT, Flags::SEAM, Flags::WIPE];
+        let flags = [
+            Flags::TRAVEL,
+            Flags::BREAK,
+            Flags::RETRACT,
+            Flags::UNRETRACT,
+            Flags::SEAM,
+            Flags::WIPE,
+            Flags::PAUSE,
+        ];
         for (at, flag) in flags.iter().enumerate() {
             assert_eq!(flag.0, 1 << (25 + at));
         }
         assert_eq!(flags.iter().fold(0, |all, flag| all | flag.0), Flags::OF_SEGMENT);
-        for (at, event) in [Flags::TOOL_CHANGE, Flags::PAUSE, Flags::FILAMENT_CHANGE].into_iter().enumerate()
-        {
+        for (at, event) in [Flags::TOOL_CHANGE, Flags::FILAMENT_CHANGE].into_iter().enumerate() {
             assert_eq!(Vertex { flags: event, ..Vertex::default() }.pack(), [0, 1 << (29 + at), 0, 0]);
         }
     }
