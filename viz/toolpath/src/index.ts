@@ -23,6 +23,7 @@ export type { BedMesh } from './surface';
 export type { CssPx, LayerIndex, Mm, Ms, Radians, VertexIndex } from './units';
 export {
   decodeVertex,
+  EVENTS,
   FEATURES,
   type FeatureName,
   FLAGS,
