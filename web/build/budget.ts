@@ -9,7 +9,7 @@ import { brotliCompressSync, constants } from 'node:zlib';
 import type { Plugin } from 'vite';
 
 /** Emitted files that a first visit does not fetch. */
-export const ON_DEMAND = /instruments|\/view-|\.gcode$|\.map$/;
+export const ON_DEMAND = /instruments|\/open_view-|\.gcode$|\.map$/;
 
 /** Where the instruments lie in the public folder and in the page. */
 const INSTRUMENTS = 'instruments';

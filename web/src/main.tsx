@@ -6,6 +6,7 @@ import './styles/controls.css';
 import './styles/layout.css';
 import './styles/job.css';
 import './styles/panels.css';
+import './styles/viewer.css';
 import './styles/instruments.css';
 import { App, PARTS, shownUpTo } from './panel/app';
 import { openDialog } from './panel/dialogs';

@@ -8,14 +8,14 @@ import type { Bed } from './bed';
 import type { BoxMm, CameraPreset, CameraState, Projection, Vec3 } from './camera';
 import type { ColourMode, ValueRange } from './colours';
 import type { Layer } from './layers';
-import { carryOut, type ViewEvent, type ViewRequest, type WorkerRequest } from './messages';
+import { carryOut, type View, type ViewEvent, type ViewRequest, type WorkerRequest } from './messages';
 import type { Theme } from './palette';
 import type { Shown } from './shown';
 import { Source } from './source';
 import type { BedMesh } from './surface';
 import type { CssPx, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
-import type { PictureSizePx, ToolpathView, ViewSizePx } from './view';
+import type { PictureSizePx, ViewSizePx } from './view';
 
 export interface ToolpathHostOptions {
   readonly size: ViewSizePx;
@@ -36,7 +36,7 @@ export class ToolpathHost {
   readonly #onEvent: (event: ViewEvent) => void;
   readonly #worker: Worker | null;
   readonly #source = new Source((request) => this.send(request));
-  #view: ToolpathView | null = null;
+  #view: View | null = null;
   #waiting: ViewRequest[] = [];
   #disposed = false;
 
@@ -50,7 +50,7 @@ export class ToolpathHost {
     }
     this.#worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'toolpath' });
     this.#worker.onmessage = ({ data }: MessageEvent<ViewEvent>) => this.#onEvent(data);
-    this.#worker.onerror = (event) => this.#onEvent({ type: 'failed', reason: event.message });
+    this.#worker.onerror = (event) => this.#onEvent({ type: 'failed', reason: event.message, isFlat: false });
     const offscreen = canvas.transferControlToOffscreen();
     this.#post({ type: 'start', canvas: offscreen, size: options.size }, [offscreen]);
   }
@@ -190,13 +190,15 @@ export class ToolpathHost {
   async #startHere(canvas: HTMLCanvasElement, size: ViewSizePx): Promise<void> {
     try {
       // Loaded only where it is needed: three.js is otherwise in the worker alone.
-      const { ToolpathView } = await import('./view');
+      const { openView } = await import('./open_view');
       if (this.#disposed) return;
-      this.#view = new ToolpathView(canvas, size, this.#onEvent);
-      this.#onEvent({ type: 'ready' });
-      for (const request of this.#waiting) carryOut(this.#view, request);
+      const { view, events } = openView(canvas, size, this.#onEvent);
+      this.#view = view;
+      for (const event of events) this.#onEvent(event);
+      if (view) for (const request of this.#waiting) carryOut(view, request);
     } catch (error) {
-      this.#onEvent({ type: 'failed', reason: error instanceof Error ? error.message : String(error) });
+      const reason = error instanceof Error ? error.message : String(error);
+      this.#onEvent({ type: 'failed', reason, isFlat: false });
     }
     this.#waiting = [];
   }

@@ -1,6 +1,7 @@
 /** The package's face: what a page may use. The view itself (three.js) is reached through the host, or `./view`. */
 export type { Bed } from './bed';
 export type { BoxMm, CameraPreset, CameraState, Projection } from './camera';
+export { type Channels, decodeChannels } from './channels';
 export {
   CATEGORICAL_MODES,
   COLOUR_MODES,

@@ -16,6 +16,9 @@ import type { CssPx, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
 import type { PictureSizePx, ToolpathView, ViewSizePx } from './view';
 
+/** What carries requests out: the 3D view, or the plane one in its place. */
+export type View = Pick<ToolpathView, Exclude<keyof ToolpathView, 'camera' | 'vertexCount'>>;
+
 export type ViewRequest =
   | { readonly type: 'setBed'; readonly bed: Bed | null }
   | { readonly type: 'begin'; readonly header: VertexHeader }
@@ -73,8 +76,8 @@ export interface Slice {
 
 export type ViewEvent =
   | { readonly type: 'ready' }
-  /** No picture can be drawn; the reason is the browser's. */
-  | { readonly type: 'failed'; readonly reason: string }
+  /** No picture in 3D can be drawn; the reason is the browser's. `isFlat`: layers are drawn from above instead. */
+  | { readonly type: 'failed'; readonly reason: string; readonly isFlat: boolean }
   | { readonly type: 'frame'; readonly report: FrameReport }
   /** What was found up to now, a few times a second while data come; `isWhole`: nothing is missing any more. */
   | { readonly type: 'ranges'; readonly ranges: ColourRanges; readonly isWhole: boolean }
@@ -86,7 +89,7 @@ export type ViewEvent =
   | { readonly type: 'contextRestored' };
 
 /** Carries a request out. */
-export function carryOut(view: ToolpathView, request: ViewRequest): void {
+export function carryOut(view: View, request: ViewRequest): void {
   switch (request.type) {
     case 'setBed':
       return view.setBed(request.bed);

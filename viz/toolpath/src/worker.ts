@@ -3,9 +3,9 @@
  *
  * Does not know: the page. A module worker; the first message must be `start`.
  */
-import { carryOut, type ViewEvent, type WorkerRequest } from './messages';
+import { carryOut, type View, type ViewEvent, type WorkerRequest } from './messages';
+import { openView } from './open_view';
 import { Source } from './source';
-import { ToolpathView } from './view';
 
 /** The part of a dedicated worker's global that is used here (the window's types are what is compiled against). */
 interface WorkerScope {
@@ -15,16 +15,13 @@ interface WorkerScope {
 }
 
 const scope = self as unknown as WorkerScope;
-let view: ToolpathView | null = null;
+let view: View | null = null;
 const source = new Source((request) => view && carryOut(view, request));
 
-function start(request: Extract<WorkerRequest, { type: 'start' }>): void {
-  try {
-    view = new ToolpathView(request.canvas, request.size, (event) => scope.postMessage(event));
-    scope.postMessage({ type: 'ready' });
-  } catch (error) {
-    scope.postMessage({ type: 'failed', reason: error instanceof Error ? error.message : String(error) });
-  }
+function start({ canvas, size }: Extract<WorkerRequest, { type: 'start' }>): void {
+  const started = openView(canvas, size, (event) => scope.postMessage(event));
+  view = started.view;
+  for (const event of started.events) scope.postMessage(event);
 }
 
 function receive({ data: request }: MessageEvent<WorkerRequest>): void {

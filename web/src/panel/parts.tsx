@@ -315,7 +315,12 @@ export function Choice<T extends string | number>({
 
 /** Gives a text to the user as a file. */
 export function download(text: string, name: string): void {
-  const url = URL.createObjectURL(new Blob([text], { type: 'text/plain' }));
+  save(new Blob([text], { type: 'text/plain' }), name);
+}
+
+/** Gives bytes to the user as a file. */
+export function save(blob: Blob, name: string): void {
+  const url = URL.createObjectURL(blob);
   const link = document.createElement('a');
   link.href = url;
   link.download = name;

@@ -70,6 +70,7 @@ function checkConfig(text: string): ConfigReport {
       extrudeMax: machine.max_extrude_mm === null ? null : mm(machine.max_extrude_mm),
       extrudeSpeedMax: machine.max_extrude_velocity_mm_s,
       hasFan: machine.has_fan,
+      filament: machine.filament_mm === null ? null : mm(machine.filament_mm),
       baud: machine.baud,
     },
   };
@@ -102,6 +103,7 @@ function fromSummary(summary: PreviewSummary): Summary {
       time: seconds(time_s),
       filament: mm(filament_mm),
     })),
+    objects: [],
     generator: summary.generator,
   };
 }

@@ -27,6 +27,11 @@ export interface FeatureShare {
   readonly filament: Mm;
 }
 
+/** An object that the file names; the first has number 1 in the vertices. */
+export interface FileObject {
+  readonly name: string;
+}
+
 /** What a file amounts to on the machine that was given. */
 export interface Summary {
   readonly errors: readonly Trouble[];
@@ -44,6 +49,7 @@ export interface Summary {
   /** From the planner; null where the machine is not known. */
   readonly time: Seconds | null;
   readonly features: readonly FeatureShare[];
+  readonly objects: readonly FileObject[];
   /** The program that wrote the file, where it says so. */
   readonly generator: string | null;
 }
@@ -70,6 +76,8 @@ export interface MachineSummary {
   /** mm/s of filament alone. */
   readonly extrudeSpeedMax: number | null;
   readonly hasFan: boolean;
+  /** The filament's diameter; null where the file sets none. */
+  readonly filament: Mm | null;
   /** For boards on a UART. */
   readonly baud: number;
 }

@@ -12,6 +12,8 @@ export const textVersion = signal(0);
 
 const blocks = new Map<number, readonly string[]>();
 let wanted: readonly number[] = [];
+/** Of a single line that is looked at elsewhere. */
+let besides: number | null = null;
 let isAsking = false;
 /** Counts files: an answer about the one before is dropped. */
 let generation = 0;
@@ -27,14 +29,23 @@ export function lineText(line: number): string | undefined {
 export function wantLines(first: number, last: number): void {
   const [from, to] = [blockOf(Math.max(first, 1)), blockOf(Math.max(last, 1))];
   wanted = Array.from({ length: Math.min(to - from + 1, BLOCKS_MAX / 2) }, (_, at) => from + at);
-  for (const block of wanted) {
-    const texts = blocks.get(block);
-    if (!texts) continue;
-    // The last of the map was looked at last.
-    blocks.delete(block);
-    blocks.set(block, texts);
-  }
+  for (const block of wanted) touch(block);
   if (!isAsking) void ask();
+}
+
+/** This line is looked at too, apart from those that are looked at together. */
+export function wantLine(line: number): void {
+  besides = blockOf(Math.max(line, 1));
+  touch(besides);
+  if (!isAsking) void ask();
+}
+
+/** The last of the map was looked at last. */
+function touch(block: number): void {
+  const texts = blocks.get(block);
+  if (!texts) return;
+  blocks.delete(block);
+  blocks.set(block, texts);
 }
 
 /** A block of which more lines may have come since. */
@@ -49,7 +60,8 @@ async function ask(): Promise<void> {
   isAsking = true;
   const tried = new Set<number>();
   for (;;) {
-    const block = wanted.find((one) => !tried.has(one) && isShort(one));
+    const all = besides === null ? wanted : [besides, ...wanted];
+    const block = all.find((one) => !tried.has(one) && isShort(one));
     if (block === undefined) break;
     tried.add(block);
     const asked = generation;
@@ -60,7 +72,7 @@ async function ask(): Promise<void> {
     blocks.set(block, texts);
     const [oldest] = blocks.keys();
     if (blocks.size > BLOCKS_MAX && oldest !== undefined) blocks.delete(oldest);
-    textVersion.value += 1;
+    textVersion.value = textVersion.peek() + 1;
   }
   isAsking = false;
 }
@@ -72,6 +84,7 @@ export function followText(): void {
     generation += 1;
     blocks.clear();
     wanted = [];
-    textVersion.value += 1;
+    besides = null;
+    textVersion.value = textVersion.peek() + 1;
   });
 }

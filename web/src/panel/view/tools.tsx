@@ -1,0 +1,121 @@
+// The buttons over the 3D view: where one looks from, how, and what besides.
+import type { CameraPreset } from '@stepcast/toolpath';
+import type { JSX } from 'preact';
+import { useState } from 'preact/hooks';
+import { file, summary } from '../../state/preview';
+import { change, settings } from '../../state/settings';
+import { pictureOf } from '../../state/view_answers';
+import { save } from '../parts';
+import { view } from './canvas';
+
+const PRESETS: readonly { readonly preset: CameraPreset; readonly name: string; readonly label: string }[] = [
+  { preset: 'iso', name: 'All', label: 'Show all of it, from in front and above' },
+  { preset: 'top', name: 'Top', label: 'View from the top' },
+  { preset: 'front', name: 'Front', label: 'View from the front' },
+  { preset: 'left', name: 'Left', label: 'View from the left' },
+  { preset: 'right', name: 'Right', label: 'View from the right' },
+  { preset: 'back', name: 'Back', label: 'View from the back' },
+];
+
+/** Of a picture that is kept; the shape is the view's. */
+const PICTURE_WIDTH_PX = 1920;
+
+async function savePicture(shape: number): Promise<void> {
+  const height = Math.round(PICTURE_WIDTH_PX / Math.min(Math.max(shape, 0.25), 4));
+  const blob = await pictureOf(PICTURE_WIDTH_PX, height);
+  const name = (file.peek()?.name ?? 'toolpath').replace(/\.(gcode|gco|g|gz|nc|txt)$/i, '');
+  if (blob) save(blob, `${name}.png`);
+}
+
+interface ToggleProps {
+  readonly name: string;
+  readonly label: string;
+  readonly isOn: boolean;
+  readonly onSet: (isOn: boolean) => void;
+}
+
+const Toggle = ({ name, label, isOn, onSet }: ToggleProps): JSX.Element => (
+  <button
+    type="button"
+    class="direction"
+    title={label}
+    aria-label={label}
+    aria-pressed={isOn}
+    onClick={() => onSet(!isOn)}
+  >
+    {name}
+  </button>
+);
+
+function Picture(): JSX.Element {
+  const [isBusy, setBusy] = useState(false);
+  const go = async (): Promise<void> => {
+    if (isBusy) return;
+    setBusy(true);
+    const box = document.querySelector('.canvas-place')?.getBoundingClientRect();
+    await savePicture(box ? box.width / Math.max(box.height, 1) : 1);
+    setBusy(false);
+  };
+  return (
+    <button
+      type="button"
+      class="direction"
+      title="Save a picture of the view as PNG"
+      aria-label="Save a picture"
+      aria-disabled={isBusy}
+      onClick={() => void go()}
+    >
+      PNG
+    </button>
+  );
+}
+
+export function ViewTools({ isFlat }: { readonly isFlat: boolean }): JSX.Element {
+  const { isOrthographic, followNozzle, showText } = settings.value;
+  return (
+    <div class="view-tools">
+      {!isFlat && (
+        <fieldset class="directions">
+          <legend class="unseen">View</legend>
+          {PRESETS.map(({ preset, name, label }) => (
+            <button
+              key={preset}
+              type="button"
+              class="direction"
+              title={label}
+              onClick={() => view.value?.setCamera(preset)}
+            >
+              {name}
+            </button>
+          ))}
+        </fieldset>
+      )}
+      <fieldset class="directions">
+        <legend class="unseen">How it is shown</legend>
+        {!isFlat && (
+          <Toggle
+            name="Parallel"
+            label="Without perspective"
+            isOn={isOrthographic}
+            onSet={(isOn) => change({ isOrthographic: isOn })}
+          />
+        )}
+        <Toggle
+          name="Follow"
+          label="Follow the nozzle"
+          isOn={followNozzle}
+          onSet={(isOn) => change({ followNozzle: isOn })}
+        />
+        {summary.value && <Picture />}
+        {file.value && (
+          <Toggle
+            name="G-code"
+            label="Show the G-code"
+            isOn={showText}
+            onSet={(isOn) => change({ showText: isOn })}
+          />
+        )}
+      </fieldset>
+    </div>
+  );
+}
