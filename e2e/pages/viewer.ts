@@ -71,4 +71,47 @@ export class Viewer {
   line(number: number): Locator {
     return this.text.locator(`#gcode-line-${number}`);
   }
+
+  /** Draws a slider's handle so far. */
+  async drag(handle: Locator, by: { readonly x: number; readonly y: number }): Promise<void> {
+    const box = await handle.boundingBox();
+    if (!box) throw new Error('the handle is not on the page');
+    const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+    const { mouse } = this.page;
+    await mouse.move(x, y);
+    await mouse.down();
+    await mouse.move(x + by.x / 2, y + by.y / 2);
+    await mouse.move(x + by.x, y + by.y);
+    await mouse.up();
+  }
+
+  /** The middle of the view, where nothing lies over it. */
+  async middle(): Promise<{ readonly x: number; readonly y: number }> {
+    const box = await this.view.boundingBox();
+    if (!box) throw new Error('the view is not on the page');
+    return { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+  }
+
+  /** What is drawn, once it does not change any more: the whole view with all that lies over it taken away. */
+  async picture(): Promise<Buffer> {
+    const take = (): Promise<Buffer> =>
+      this.view.screenshot({ style: BARE, animations: 'disabled', caret: 'hide' });
+    let before = await take();
+    for (let tries = 0; tries < TRIES_MAX; tries += 1) {
+      // The full picture comes after the quick one, some time after the last change.
+      await this.page.waitForTimeout(SETTLE_MS);
+      const now = await take();
+      if (now.equals(before)) return now;
+      before = now;
+    }
+    throw new Error('the picture does not settle');
+  }
 }
+
+/** Only the view itself, without the mark of the focus. */
+const BARE = `
+  .over-left, .legend, .segment-card, .hover-note { visibility: hidden !important; }
+  .canvas-place { outline: none !important; }
+`;
+const SETTLE_MS = 400;
+const TRIES_MAX = 50;

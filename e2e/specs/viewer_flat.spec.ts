@@ -1,0 +1,35 @@
+// A browser without WebGL 2: that is said, and layers are shown from above.
+import { browserArguments, findBrowser } from '../../scripts/lib/browser.mjs';
+import { expect, test } from '../fixtures/files.ts';
+import { sample } from '../pages/panel.ts';
+import { Viewer } from '../pages/viewer.ts';
+
+test.use({
+  launchOptions: {
+    executablePath: findBrowser() ?? '',
+    args: [...browserArguments(), '--disable-webgl2', '--disable-webgl'],
+  },
+});
+
+test('without WebGL 2 the layers are drawn from above, and a segment is found', async ({
+  panel,
+  page,
+  watch,
+}) => {
+  const viewer = new Viewer(page);
+  watch.expectError(/WebGL/);
+  await expect(viewer.region.getByRole('status')).toContainText('No 3D view here');
+  await panel.drop(sample('test-part.gcode'));
+  await viewer.ready();
+  const whole = await viewer.picture();
+  await viewer.topLayer.focus();
+  await page.keyboard.press('Home');
+  expect((await viewer.picture()).equals(whole), 'another layer').toBe(false);
+  const { x, y } = await viewer.middle();
+  await page.mouse.click(x, y);
+  await expect(viewer.segment).toBeVisible();
+  await viewer.view.focus();
+  const before = await viewer.picture();
+  await page.keyboard.press('+');
+  expect((await viewer.picture()).equals(before), 'nearer').toBe(false);
+});
