@@ -47,6 +47,10 @@ async function read(
       const vertices = preview.takeVertices();
       const marks = preview.takeMarks();
       if (marks.length > 0) tell({ kind: 'marks', job, marks }, [marks.buffer]);
+      const steps = preview.takeLineSteps();
+      if (steps.length > 0) tell({ kind: 'line-steps', job, steps }, [steps.buffer]);
+      const thumbnails = preview.takeThumbnails();
+      if (thumbnails.length > 0) tell({ kind: 'thumbnails', job, thumbnails });
       if (vertices.length === 0) return;
       tell({ kind: 'vertices', job, vertices }, [vertices.buffer]);
     }
