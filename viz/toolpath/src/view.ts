@@ -31,6 +31,7 @@ import { NozzleObject } from './nozzle';
 import { featureMask, PALETTES, type Palette, type Theme } from './palette';
 import { ALL_PRINTED, PathObjects } from './path';
 import { SHOW_ALL, type Shown, validRange } from './shown';
+import { sliceOf } from './slice';
 import { pixelAngle, Stage, type Surface } from './stage';
 import { type BedMesh, isMesh } from './surface';
 import type { CssPx, Ms, VertexIndex } from './units';
@@ -92,6 +93,8 @@ export class ToolpathView {
   #object: number | null = null;
   #volume: BoxMm | null = null;
   #mesh: BedMesh | null = null;
+  #nozzleMm: Vec3 | null = null;
+  #follows = false;
 
   constructor(
     canvas: HTMLCanvasElement | OffscreenCanvas,
@@ -214,7 +217,15 @@ export class ToolpathView {
     const place = at?.every(Number.isFinite) ? at : null;
     if (place === null && !this.#nozzle.isShown) return;
     this.#nozzle.at = place;
+    this.#nozzleMm = place;
     this.#loop.overlaid();
+    this.#followNozzle();
+  }
+
+  /** The camera goes with the nozzle, as long as that is shown. */
+  setFollow(follow: boolean): void {
+    this.#follows = follow;
+    this.#followNozzle();
   }
 
   /** Marks the segment that ends at this vertex; null marks none. */
@@ -249,6 +260,17 @@ export class ToolpathView {
 
   picture(id: number, _size: PictureSizePx): void {
     this.#tell({ type: 'picture', id, blob: null });
+  }
+
+  /** Hands out vertices `first … end − 1`, as far as they are there. */
+  slice(first: VertexIndex, end: VertexIndex, id: number): void {
+    const vertices = this.#store ? sliceOf(this.#store, { first, end }) : new Uint32Array();
+    const channels = new Uint32Array();
+    this.#tell({
+      type: 'slice',
+      id,
+      slice: { first, header: this.#store?.header ?? null, vertices, channels },
+    });
   }
 
   setTheme(theme: Theme): void {
@@ -326,6 +348,13 @@ export class ToolpathView {
   #move(camera: CameraState): void {
     this.#camera = camera;
     this.#loop.moved();
+  }
+
+  #followNozzle(): void {
+    const at = this.#nozzleMm;
+    if (!this.#follows || !at) return;
+    const [x, y, z] = this.#camera.targetMm;
+    if (x !== at[0] || y !== at[1] || z !== at[2]) this.#move({ ...this.#camera, targetMm: at });
   }
 
   #bedBox(): BoxMm | null {

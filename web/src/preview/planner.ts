@@ -25,6 +25,8 @@ export interface FilePreview {
   takeLineSteps(): Uint8Array<ArrayBuffer>;
   /** The file's pictures of the print, new since last time. */
   takeThumbnails(): readonly Thumbnail[];
+  /** What the planner knows of the vertices, in their order, later than they come; new since last time. */
+  takeChannels(): Uint32Array<ArrayBuffer>;
   /** After `finish`. */
   summary(): Summary;
   free(): void;
@@ -156,6 +158,10 @@ class WasmPreview implements FilePreview {
       thumbnail.free();
       return { picture, width, height };
     });
+  }
+
+  takeChannels(): Uint32Array<ArrayBuffer> {
+    return new Uint32Array();
   }
 
   summary(): Summary {

@@ -112,6 +112,18 @@ export type ToPreview =
       readonly name: string;
       readonly config: string | null;
     }
+  /** Nothing is to be read any more, or shown of what was. */
+  | { readonly kind: 'close'; readonly job: number }
+  /** Where the geometry goes: requests of the 3D view, each with its job, past the page's main thread. */
+  | { readonly kind: 'draw'; readonly port: MessagePort }
+  /** Asks for lines of the open file, as far as it has been read; what was asked before is of no interest any more. */
+  | {
+      readonly kind: 'text';
+      readonly id: number;
+      readonly job: number;
+      readonly first: number;
+      readonly last: number;
+    }
   | { readonly kind: 'check-config'; readonly id: number; readonly text: string }
   /** Asks for lines of a file; what was asked before is of no interest any more. */
   | {
@@ -125,15 +137,15 @@ export type ToPreview =
 export type FromPreview =
   | { readonly kind: 'loaded' }
   | { readonly kind: 'failed'; readonly job: number | null; readonly trouble: Trouble }
-  | { readonly kind: 'begun'; readonly job: number; readonly header: VertexHeader }
-  | { readonly kind: 'vertices'; readonly job: number; readonly vertices: Uint32Array<ArrayBuffer> }
   /** Pairs of a line and the vertex where its segment ends, some dozens of vertices apart, in order. */
   | { readonly kind: 'marks'; readonly job: number; readonly marks: Uint32Array<ArrayBuffer> }
   /** One byte a vertex, in order: how many lines further than the one before it it comes from; 255 where a mark says. */
   | { readonly kind: 'line-steps'; readonly job: number; readonly steps: Uint8Array<ArrayBuffer> }
   | { readonly kind: 'thumbnails'; readonly job: number; readonly thumbnails: readonly Thumbnail[] }
-  | { readonly kind: 'progress'; readonly job: number; readonly bytes: number }
+  | { readonly kind: 'progress'; readonly job: number; readonly bytes: number; readonly lines: number }
   | { readonly kind: 'summary'; readonly job: number; readonly summary: Summary }
   /** Fewer where the file ends before; none where it cannot be read. */
   | { readonly kind: 'lines'; readonly id: number; readonly texts: readonly string[] }
+  /** Answers `text`; fewer where the file ends before, none where another question came meanwhile. */
+  | { readonly kind: 'text'; readonly id: number; readonly texts: readonly string[] }
   | { readonly kind: 'config'; readonly id: number; readonly report: ConfigReport };
