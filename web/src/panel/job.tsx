@@ -1,10 +1,11 @@
 // The file as a print: what it takes, what stands against it, and starting, pausing, ending it.
 import { effect, signal } from '@preact/signals';
 import type { JSX } from 'preact';
+import { useEffect, useRef } from 'preact/hooks';
 import { dateFormat } from '../dates';
-import type { Summary } from '../preview/protocol';
+import type { Summary, Thumbnail } from '../preview/protocol';
 import { connection, isPrinting, job, outcome, snapshot, wish } from '../state/machine';
-import { closeFile, file, type OpenFile, openFile, summary } from '../state/preview';
+import { closeFile, file, type OpenFile, openFile, summary, thumbnails } from '../state/preview';
 import {
   finishesIn,
   heatingUp,
@@ -234,6 +235,35 @@ function Outcome(): JSX.Element {
   );
 }
 
+/** A side of the picture in the card, in pixels of a sharp screen. */
+const PICTURE_PX = 112;
+
+/** The smallest of the slicer's pictures that is sharp here, else its largest; of the file that is shown. */
+function pictureOf(all: readonly Thumbnail[]): Thumbnail | null {
+  const bySize = [...all].sort((a, b) => a.height - b.height);
+  return bySize.find(({ height }) => height >= PICTURE_PX) ?? bySize.at(-1) ?? null;
+}
+
+function FilePicture(): JSX.Element {
+  const place = useRef<HTMLImageElement>(null);
+  const found = isPrinting.value && !isShown.value ? null : pictureOf(thumbnails.value);
+  const picture = found?.picture ?? null;
+  useEffect(() => {
+    const image = place.current;
+    if (!image || !picture) return;
+    const url = URL.createObjectURL(picture);
+    image.src = url;
+    return () => URL.revokeObjectURL(url);
+  }, [picture]);
+  if (!picture)
+    return (
+      <span class="job-icon">
+        <Icon name="file" />
+      </span>
+    );
+  return <img ref={place} class="job-picture" alt="Picture of the print" />;
+}
+
 /** The file of the card: the one that is printed, else the one that is shown. */
 function Head({
   open,
@@ -244,9 +274,7 @@ function Head({
 }): JSX.Element {
   return (
     <div class="job-head">
-      <span class="job-icon">
-        <Icon name="file" />
-      </span>
+      <FilePicture />
       <div class="job-name">
         <h2 title={open.name}>{open.name}</h2>
         <p class="dim">

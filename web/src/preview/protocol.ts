@@ -27,9 +27,21 @@ export interface FeatureShare {
   readonly filament: Mm;
 }
 
-/** An object that the file names; the first has number 1 in the vertices. */
-export interface FileObject {
+/** An object that a file names. */
+export interface ObjectShare {
   readonly name: string;
+  /** Its middle on the bed, in G-code's coordinates, where the file gives it. */
+  readonly centre: readonly [Mm, Mm] | null;
+  readonly filament: Mm;
+}
+
+/** A picture of the print that its slicer put into the file. */
+export interface Thumbnail {
+  /** PNG or JPEG. */
+  readonly picture: Blob;
+  /** In pixels. */
+  readonly width: number;
+  readonly height: number;
 }
 
 /** What a file amounts to on the machine that was given. */
@@ -49,7 +61,8 @@ export interface Summary {
   /** From the planner; null where the machine is not known. */
   readonly time: Seconds | null;
   readonly features: readonly FeatureShare[];
-  readonly objects: readonly FileObject[];
+  /** The first has number 1 in the vertices. */
+  readonly objects: readonly ObjectShare[];
   /** The program that wrote the file, where it says so. */
   readonly generator: string | null;
 }
@@ -128,6 +141,9 @@ export type FromPreview =
   | { readonly kind: 'failed'; readonly job: number | null; readonly trouble: Trouble }
   /** Pairs of a line and the vertex where its segment ends, some dozens of vertices apart, in order. */
   | { readonly kind: 'marks'; readonly job: number; readonly marks: Uint32Array<ArrayBuffer> }
+  /** One byte a vertex, in order: how many lines further than the one before it it comes from; 255 where a mark says. */
+  | { readonly kind: 'line-steps'; readonly job: number; readonly steps: Uint8Array<ArrayBuffer> }
+  | { readonly kind: 'thumbnails'; readonly job: number; readonly thumbnails: readonly Thumbnail[] }
   | { readonly kind: 'progress'; readonly job: number; readonly bytes: number; readonly lines: number }
   | { readonly kind: 'summary'; readonly job: number; readonly summary: Summary }
   /** Fewer where the file ends before; none where it cannot be read. */

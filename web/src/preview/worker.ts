@@ -55,6 +55,10 @@ function pass(preview: FilePreview, job: number): void {
     const vertices = preview.takeVertices();
     const marks = preview.takeMarks();
     if (marks.length > 0) tell({ kind: 'marks', job, marks }, [marks.buffer]);
+    const steps = preview.takeLineSteps();
+    if (steps.length > 0) tell({ kind: 'line-steps', job, steps }, [steps.buffer]);
+    const thumbnails = preview.takeThumbnails();
+    if (thumbnails.length > 0) tell({ kind: 'thumbnails', job, thumbnails });
     if (vertices.length > 0) draw(job, { type: 'append', vertices }, [vertices.buffer]);
     const words = preview.takeChannels();
     if (words.length > 0) draw(job, { type: 'appendChannels', words }, [words.buffer]);

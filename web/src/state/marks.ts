@@ -1,82 +1,85 @@
-// Which vertex of the drawn path belongs to which line of the file. Marks are pairs of a line and the vertex where its
-// segment ends, some dozens of vertices apart, in order; steps say of each vertex how many lines further it comes from than
-// the one before. Without steps, answers are right to some dozens of vertices. Knows neither files nor drawing.
+// Which vertex of the drawn path belongs to which line of the file. Two sources: marks, pairs of a line and a vertex some
+// dozens of vertices apart; and line steps, one byte a vertex, how many lines further than the one before it it comes
+// from, 255 where a mark says. Both in order. Knows neither files nor drawing.
 
-/** A step so long says only that there is a mark at its vertex. */
-const STEP_MARKED = 255;
+type Numbers = Uint32Array<ArrayBuffer> | Uint8Array<ArrayBuffer>;
 
-function grown<T extends Uint32Array | Uint8Array>(array: T, used: number, more: number): T {
-  if (used + more <= array.length) return array;
-  const larger = new (array.constructor as new (length: number) => T)(
-    Math.max(array.length * 2, used + more),
-  );
-  larger.set(array.subarray(0, used));
-  return larger;
-}
-
-interface Mark {
-  readonly line: number;
-  readonly vertex: number;
-}
-
-export class LineMarks {
-  #pairs = new Uint32Array(4096);
+/** Numbers that are added to those that are there; the memory doubles, so that a long file costs no more copies. */
+class Growing<T extends Numbers> {
+  #values: T;
   #used = 0;
-  #steps = new Uint8Array(4096);
-  #vertices = 0;
+  readonly #make: (length: number) => T;
 
-  /** Adds pairs to those that are there; the memory doubles, so that a long file costs no more copies than a short one. */
-  append(more: Uint32Array): void {
-    this.#pairs = grown(this.#pairs, this.#used, more.length);
-    this.#pairs.set(more, this.#used);
+  constructor(make: (length: number) => T) {
+    this.#make = make;
+    this.#values = make(4096);
+  }
+
+  get length(): number {
+    return this.#used;
+  }
+
+  append(more: T): void {
+    if (this.#used + more.length > this.#values.length) {
+      const larger = this.#make(Math.max(this.#values.length * 2, this.#used + more.length));
+      larger.set(this.#values.subarray(0, this.#used));
+      this.#values = larger;
+    }
+    this.#values.set(more, this.#used);
     this.#used += more.length;
   }
 
-  /** Adds the steps of the next vertices. */
-  appendSteps(more: Uint8Array): void {
-    this.#steps = grown(this.#steps, this.#vertices, more.length);
-    this.#steps.set(more, this.#vertices);
-    this.#vertices += more.length;
+  at(index: number): number {
+    return this.#values[index] ?? 0;
+  }
+}
+
+export class LineMarks {
+  readonly #pairs = new Growing((length) => new Uint32Array(length));
+  readonly #steps = new Growing((length) => new Uint8Array(length));
+
+  append(pairs: Uint32Array<ArrayBuffer>): void {
+    this.#pairs.append(pairs);
+  }
+
+  appendSteps(steps: Uint8Array<ArrayBuffer>): void {
+    this.#steps.append(steps);
   }
 
   /** The last vertex that has been made when this line's moves have been made. */
   vertexAt(line: number): number {
-    const mark = this.#last((at) => (this.#pairs[at * 2] ?? 0) <= line);
-    const from = mark ?? { line: this.#steps[0] ?? 0, vertex: 0 };
-    let { vertex } = from;
-    for (let reached = from.line; vertex + 1 < this.#vertices; vertex += 1) {
-      const step = this.#steps[vertex + 1] ?? 0;
-      reached += step;
-      if (step === STEP_MARKED || reached > line) break;
+    const mark = this.#lastMark(0, line);
+    if (mark < 0) return 0;
+    let vertex = this.#pairs.at(mark * 2 + 1);
+    const next = mark * 2 + 3;
+    const end = Math.min(
+      next < this.#pairs.length ? this.#pairs.at(next) : Number.MAX_VALUE,
+      this.#steps.length,
+    );
+    for (let at = this.#pairs.at(mark * 2); vertex + 1 < end; vertex += 1) {
+      at += this.#steps.at(vertex + 1);
+      if (at > line) break;
     }
     return vertex;
   }
 
-  /** The line whose segment ends at this vertex; null where there is none. */
+  /** The line that a vertex comes from; null where that is not known (yet). */
   lineAt(vertex: number): number | null {
-    const mark = this.#last((at) => (this.#pairs[at * 2 + 1] ?? 0) <= vertex);
-    if (!mark) return this.#sum(0, vertex);
-    if (mark.vertex === vertex) return mark.line;
-    const further = this.#sum(mark.vertex + 1, vertex);
-    return further === null ? null : mark.line + further;
+    const mark = this.#lastMark(1, vertex);
+    if (mark < 0 || vertex >= this.#steps.length) return null;
+    let line = this.#pairs.at(mark * 2);
+    for (let at = this.#pairs.at(mark * 2 + 1) + 1; at <= vertex; at += 1) line += this.#steps.at(at);
+    return line;
   }
 
-  #sum(first: number, last: number): number | null {
-    if (last >= this.#vertices) return null;
-    let sum = 0;
-    for (let at = first; at <= last; at += 1) sum += this.#steps[at] ?? 0;
-    return sum;
-  }
-
-  /** The last mark of those that hold, which come first. */
-  #last(holds: (at: number) => boolean): Mark | null {
-    let [low, high] = [0, this.#used / 2];
+  /** The last mark whose line (0) or vertex (1) is not beyond this; -1 where there is none. */
+  #lastMark(which: 0 | 1, value: number): number {
+    let [low, high] = [0, this.#pairs.length / 2];
     while (low < high) {
       const middle = (low + high) >>> 1;
-      if (holds(middle)) low = middle + 1;
+      if (this.#pairs.at(middle * 2 + which) <= value) low = middle + 1;
       else high = middle;
     }
-    if (low === 0) return null;
-    return { line: this.#pairs[low * 2 - 2] ?? 0, vertex: this.#pairs[low * 2 - 1] ?? 0 };
+    return low - 1;
   }
 }

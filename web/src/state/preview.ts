@@ -3,7 +3,7 @@
 import { effect, signal } from '@preact/signals';
 import type { Trouble } from '../machine/protocol';
 import { previewDied } from '../machine/troubles';
-import type { ConfigReport, FromPreview, Summary, ToPreview } from '../preview/protocol';
+import type { ConfigReport, FromPreview, Summary, Thumbnail, ToPreview } from '../preview/protocol';
 import { note } from './log';
 import { LineMarks } from './marks';
 import { activeProfile } from './profiles';
@@ -29,6 +29,8 @@ export const summary = signal<Summary | null>(null);
 export const failure = signal<Trouble | null>(null);
 /** Lines that have been read of it so far. */
 export const linesRead = signal(0);
+/** The pictures of the print that are in it; a handful at most. */
+export const thumbnails = signal<readonly Thumbnail[]>([]);
 export const confirmed = signal<ReadonlySet<number>>(new Set());
 
 /** A worker that stops this often without having read anything in between is not started again. */
@@ -147,6 +149,7 @@ function read(config: string): void {
   confirmed.value = new Set();
   marks = new LineMarks();
   linesRead.value = 0;
+  thumbnails.value = [];
   sink?.discard(job);
   if (!worker && lastDeath) {
     reading.value = null;
@@ -169,6 +172,7 @@ export function closeFile(): void {
   summary.value = null;
   failure.value = null;
   linesRead.value = 0;
+  thumbnails.value = [];
   sink?.discard(job);
   send({ kind: 'close', job });
 }
@@ -232,6 +236,12 @@ function take(message: FromPreview): void {
   switch (message.kind) {
     case 'marks':
       marks.append(message.marks);
+      break;
+    case 'line-steps':
+      marks.appendSteps(message.steps);
+      break;
+    case 'thumbnails':
+      thumbnails.value = [...thumbnails.value, ...message.thumbnails];
       break;
     case 'progress':
       reading.value = Math.min(1, message.bytes / Math.max(1, file.value?.blob.size ?? 1));
