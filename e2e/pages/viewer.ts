@@ -94,8 +94,28 @@ export class Viewer {
 
   /** What is drawn, once it does not change any more: the whole view with all that lies over it taken away. */
   async picture(): Promise<Buffer> {
-    const take = (): Promise<Buffer> =>
-      this.view.screenshot({ style: BARE, animations: 'disabled', caret: 'hide' });
+    await this.bare(true);
+    try {
+      return await this.settled();
+    } finally {
+      await this.bare(false);
+    }
+  }
+
+  /** Transparent, not away: what has the focus keeps it. Through the object model, which the page's policy lets pass. */
+  private async bare(isBare: boolean): Promise<void> {
+    await this.region.evaluate(
+      (region, [over, isBare]) => {
+        for (const one of region.querySelectorAll<HTMLElement>(over)) one.style.opacity = isBare ? '0' : '';
+        const view = region.querySelector<HTMLElement>('.canvas-place');
+        if (view) view.style.outline = isBare ? 'none' : '';
+      },
+      [OVER_VIEW, isBare] as const,
+    );
+  }
+
+  private async settled(): Promise<Buffer> {
+    const take = (): Promise<Buffer> => this.view.screenshot({ animations: 'disabled', caret: 'hide' });
     let before = await take();
     for (let tries = 0; tries < TRIES_MAX; tries += 1) {
       // The full picture comes after the quick one, some time after the last change.
@@ -108,10 +128,6 @@ export class Viewer {
   }
 }
 
-/** Only the view itself, without the mark of the focus. */
-const BARE = `
-  .over-left, .legend, .segment-card, .hover-note { visibility: hidden !important; }
-  .canvas-place { outline: none !important; }
-`;
+const OVER_VIEW = '.over-left, .legend, .segment-card, .hover-note';
 const SETTLE_MS = 400;
 const TRIES_MAX = 50;

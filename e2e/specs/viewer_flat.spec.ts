@@ -7,7 +7,7 @@ import { Viewer } from '../pages/viewer.ts';
 test.use({
   launchOptions: {
     executablePath: findBrowser() ?? '',
-    args: [...browserArguments(), '--disable-webgl2', '--disable-webgl'],
+    args: [...browserArguments(), '--disable-3d-apis'],
   },
 });
 

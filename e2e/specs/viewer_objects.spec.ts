@@ -61,7 +61,7 @@ test('the picture that a slicer put into the file is shown', async ({ panel, pag
   const thumbnail = `; thumbnail begin 32x32 ${PNG.length}\n; ${PNG}\n; thumbnail end\n`;
   await panel.drop(makeFile('pictured.gcode', `${thumbnail}${KLIPPER}`));
   await viewer.ready();
-  const image = panel.job.getByRole('img', { name: 'Picture of the print' });
+  const image = panel.job.getByRole('img', { name: 'The print, as its slicer drew it' });
   await expect(image).toBeVisible();
   await expect.poll(() => image.evaluate((one: HTMLImageElement) => one.naturalWidth)).toBe(32);
   await panel.drop(makeFile('plain.gcode', KLIPPER));

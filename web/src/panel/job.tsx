@@ -261,7 +261,7 @@ function FilePicture(): JSX.Element {
         <Icon name="file" />
       </span>
     );
-  return <img ref={place} class="job-picture" alt="Picture of the print" />;
+  return <img ref={place} class="job-picture" alt="The print, as its slicer drew it" />;
 }
 
 /** The file of the card: the one that is printed, else the one that is shown. */
