@@ -108,6 +108,7 @@ fn declarations(config: &Config) -> Vec<File> {
         one::<m::Blocking>(config),
         one::<m::LayerSummary>(config),
         one::<m::FeatureSummary>(config),
+        one::<m::ObjectSummary>(config),
         one::<m::PreviewSummary>(config),
         one::<m::JournalView>(config),
         one::<m::InterruptionView>(config),

@@ -2,7 +2,7 @@
 
 use printer::{
     error::{ErrorCode, PrinterError},
-    preview,
+    preview::{self, PictureFormat},
 };
 use wasm_bindgen::prelude::{JsError, wasm_bindgen};
 
@@ -91,6 +91,18 @@ impl Preview {
         self.reader.as_mut().map(preview::Preview::take_marks).unwrap_or_default()
     }
 
+    /// How many lines further than the vertex before it each vertex comes from, new since the last call; 255 where that is
+    /// more, which then has a mark.
+    pub fn take_line_steps(&mut self) -> Vec<u8> {
+        self.reader.as_mut().map(preview::Preview::take_line_steps).unwrap_or_default()
+    }
+
+    /// The file's pictures of the print, new since the last call.
+    pub fn take_thumbnails(&mut self) -> Vec<Thumbnail> {
+        let thumbnails = self.reader.as_mut().map(preview::Preview::take_thumbnails).unwrap_or_default();
+        thumbnails.into_iter().map(Thumbnail).collect()
+    }
+
     /// Bytes of the file that have been read.
     #[wasm_bindgen(getter)]
     pub fn progress(&self) -> f64 {
@@ -103,5 +115,40 @@ impl Preview {
             self.summary = json(&PreviewSummary::of(reader.finish()));
         }
         self.summary.clone()
+    }
+}
+
+/// A picture of the print: a PNG's or JPEG's file.
+#[wasm_bindgen]
+pub struct Thumbnail(preview::Thumbnail);
+
+#[wasm_bindgen]
+impl Thumbnail {
+    /// Its media type.
+    #[wasm_bindgen(getter)]
+    pub fn mime(&self) -> String {
+        let mime = match self.0.format {
+            PictureFormat::Png => "image/png",
+            PictureFormat::Jpeg => "image/jpeg",
+        };
+        mime.to_owned()
+    }
+
+    /// Pixels across.
+    #[wasm_bindgen(getter)]
+    pub fn width(&self) -> u32 {
+        self.0.size[0]
+    }
+
+    /// Pixels down.
+    #[wasm_bindgen(getter)]
+    pub fn height(&self) -> u32 {
+        self.0.size[1]
+    }
+
+    /// Its file's bytes.
+    #[wasm_bindgen(getter)]
+    pub fn bytes(&self) -> Vec<u8> {
+        self.0.bytes.clone()
     }
 }

@@ -5,9 +5,11 @@
 export const CHUNK_BYTES_MAX = 256 * 1024;
 const GZIP = [0x1f, 0x8b] as const;
 
-async function isGzip(file: Blob): Promise<boolean> {
+export type Packing = 'plain' | 'gzip';
+
+export async function packingOf(file: Blob): Promise<Packing> {
   const start = new Uint8Array(await file.slice(0, GZIP.length).arrayBuffer());
-  return GZIP.every((byte, index) => start[index] === byte);
+  return GZIP.every((byte, index) => start[index] === byte) ? 'gzip' : 'plain';
 }
 
 /** Reads a file from front to back. */
@@ -24,7 +26,8 @@ export class FileChunks {
     this.#count = count;
   }
 
-  static async open(file: Blob): Promise<FileChunks> {
+  /** `packing` is what the file is; without it its first bytes say so. */
+  static async open(file: Blob, packing?: Packing): Promise<FileChunks> {
     const count = { bytes: 0 };
     const counted = file.stream().pipeThrough(
       new TransformStream<Uint8Array<ArrayBuffer>, Uint8Array<ArrayBuffer>>({
@@ -34,7 +37,8 @@ export class FileChunks {
         },
       }),
     );
-    const unpacked = (await isGzip(file)) ? counted.pipeThrough(new DecompressionStream('gzip')) : counted;
+    const isPacked = (packing ?? (await packingOf(file))) === 'gzip';
+    const unpacked = isPacked ? counted.pipeThrough(new DecompressionStream('gzip')) : counted;
     return new FileChunks(unpacked.getReader(), count);
   }
 
@@ -126,8 +130,9 @@ export async function linesOf(
   first: number,
   last: number,
   isWanted: () => boolean = () => true,
+  packing?: Packing,
 ): Promise<string[]> {
-  const chunks = await FileChunks.open(file);
+  const chunks = await FileChunks.open(file, packing);
   const picker = new LinePicker(first, last);
   try {
     for (let chunk = await chunks.next(); chunk && !picker.isDone; chunk = await chunks.next()) {

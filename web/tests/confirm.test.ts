@@ -18,6 +18,7 @@ const found = (blocking: readonly Remark[], dropped = 0): Summary => ({
   layers: [],
   time: null,
   features: [],
+  objects: [],
   generator: null,
 });
 

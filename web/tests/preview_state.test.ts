@@ -28,7 +28,7 @@ test('it says that no print is touched, and the next file is read by a new one',
   expect(page.failure.value?.code).toBe('preview-died');
   expect(page.failure.value?.safe).toContain('a running print is not touched');
   page.openFile(new Blob(['G28']), 'other.gcode');
-  expect(workers[1]?.sent.map(({ kind }) => kind)).toEqual(['open']);
+  expect(workers[1]?.sent.map(({ kind }) => kind)).toEqual(['draw', 'open']);
   expect([page.failure.value, page.reading.value]).toEqual([null, 0]);
 });
 

@@ -24,6 +24,7 @@ const plan: Summary = {
   layers,
   time: seconds(200),
   features: [],
+  objects: [],
   generator: null,
 };
 const file = { name: 'part.gcode', blob: new Blob() };

@@ -1,6 +1,7 @@
 //! Comments that mean something: what the slicers tell a viewer about layers, features and time.
 //!
-//! Knows the dialects of `PrusaSlicer`, Orca (and Bambu Studio), Cura and Simplify3D. Pictures are skipped.
+//! Knows the dialects of `PrusaSlicer`, Orca (and Bambu Studio), Cura and Simplify3D. Of pictures it knows where they begin
+//! and end, not what is in them.
 
 use units::{Mm, Seconds};
 
@@ -112,15 +113,50 @@ pub enum Annotation {
     ElapsedTime(Seconds),
     /// The program that wrote the file.
     Generator(String),
+    /// A line of a picture of the print; only for those who
+    /// [ask for it](crate::Interpreter::show_pictures).
+    Picture(PictureLine),
 }
 
-/// Reads a whole-line comment (what follows its `;`). `in_thumbnail` carries over from line to line whether this is a
-/// picture.
-pub(crate) fn read(comment: &[u8], in_thumbnail: &mut bool, mut push: impl FnMut(Annotation)) {
+/// A line of a picture of the print.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PictureLine {
+    /// A picture begins.
+    Begin,
+    /// Some of its bytes, in base64: what stands in the line, at most [`LINE_BYTES_MAX`](crate::LINE_BYTES_MAX) bytes.
+    Text(Box<[u8]>),
+    /// It ends.
+    End,
+}
+
+/// What is carried over from comment to comment.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pictures {
+    /// This is one.
+    pub(crate) within: bool,
+    /// Somebody wants to see them.
+    pub(crate) shown: bool,
+}
+
+impl Pictures {
+    /// A comment within a picture, without the blanks around it.
+    fn read(&mut self, text: &[u8], push: &mut impl FnMut(Annotation)) {
+        self.within = !(text.starts_with(b"thumbnail") && text.ends_with(b"end"));
+        if self.shown {
+            push(Annotation::Picture(if self.within {
+                PictureLine::Text(text.into())
+            } else {
+                PictureLine::End
+            }));
+        }
+    }
+}
+
+/// Reads a whole-line comment (what follows its `;`).
+pub(crate) fn read(comment: &[u8], pictures: &mut Pictures, mut push: impl FnMut(Annotation)) {
     let text = comment.trim_ascii();
-    if *in_thumbnail {
-        *in_thumbnail = !(text.starts_with(b"thumbnail") && text.ends_with(b"end"));
-        return;
+    if pictures.within {
+        return pictures.read(text, &mut push);
     }
     let Some(&first) = text.first() else { return };
     match first.to_ascii_uppercase() {
@@ -129,7 +165,10 @@ pub(crate) fn read(comment: &[u8], in_thumbnail: &mut bool, mut push: impl FnMut
         _ => return,
     }
     if text.starts_with(b"thumbnail") {
-        *in_thumbnail = memchr::memmem::find(text, b" begin").is_some();
+        pictures.within = memchr::memmem::find(text, b" begin").is_some();
+        if pictures.within && pictures.shown {
+            push(Annotation::Picture(PictureLine::Begin));
+        }
         return;
     }
     let keyed = text.iter().position(|&b| b == b':').is_some_and(|colon| {
@@ -240,9 +279,9 @@ mod tests {
 
     fn annotations(comments: &[&str]) -> Vec<Annotation> {
         let mut out = Vec::new();
-        let mut in_thumbnail = false;
+        let mut pictures = Pictures::default();
         for comment in comments {
-            read(comment.as_bytes(), &mut in_thumbnail, |a| out.push(a));
+            read(comment.as_bytes(), &mut pictures, |a| out.push(a));
         }
         out
     }
@@ -319,5 +358,23 @@ mod tests {
         ];
         assert_eq!(annotations(&picture), []);
         assert_eq!(annotations(&[" thumbnail_JPG begin 1x1", " Z:1", " thumbnail_JPG end", "Z:1"]).len(), 1);
+    }
+
+    #[test]
+    fn pictures_are_shown_to_those_who_ask() {
+        let mut pictures = Pictures { shown: true, ..Pictures::default() };
+        let mut out = Vec::new();
+        for line in [
+            " thumbnail begin 16x16 12",
+            " iVBORw0",
+            " thumbnail end",
+            " thumbnails = 16x16/PNG",
+            "LAYER_CHANGE",
+        ] {
+            read(line.as_bytes(), &mut pictures, |a| out.push(a));
+        }
+        let picture = [PictureLine::Begin, PictureLine::Text((*b"iVBORw0").into()), PictureLine::End];
+        let expected = picture.map(Annotation::Picture).into_iter().chain([Annotation::LayerChange]);
+        assert_eq!(out, expected.collect::<Vec<_>>());
     }
 }

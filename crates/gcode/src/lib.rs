@@ -26,7 +26,7 @@ pub use action::{
     Action, AxisShaper, AxisValues, Heater, InputShaper, MachineLimits, Move, ObjectAction, ObjectId,
     PauseReason, Position, ShaperName, VelocityLimit, Wait,
 };
-pub use annotation::{Annotation, Feature};
+pub use annotation::{Annotation, Feature, PictureLine};
 pub use arc::{Arc, ArcError, CHORD_TOLERANCE, CHORD_TOLERANCE_MIN, Chords, Plane};
 pub use diagnostic::{Diagnostic, DiagnosticCode, Severity};
 pub use interpreter::{FirmwareRetraction, Interpreter, Settings};

@@ -120,6 +120,11 @@ impl Checker {
         }
     }
 
+    /// Pictures are among the actions that [`Self::feed_with`] shows.
+    pub fn show_pictures(&mut self) {
+        self.interpreter.show_pictures();
+    }
+
     /// Takes the next bytes of the file.
     pub fn feed(&mut self, bytes: &[u8]) {
         self.feed_with(bytes, |_, _| {});

@@ -19,7 +19,8 @@ pub use error::ErrorMessage;
 pub use event::{HeaterName, PhaseLabel, UiEvent};
 pub use journal::{InterruptionView, JournalView};
 pub use preview::{
-    Blocking, FeatureSummary, FileKindReport, Finding, FindingSeverity, LayerSummary, PreviewSummary,
+    Blocking, FeatureSummary, FileKindReport, Finding, FindingSeverity, LayerSummary, ObjectSummary,
+    PreviewSummary,
 };
 pub use request::{JobRequest, JogAxis, UiRequest};
 pub use snapshot::{BoardView, JobPhase, JobView, LinkView, Snapshot, StartView, TemperatureView};

@@ -92,6 +92,18 @@ pub struct FeatureSummary {
     pub filament_mm: f64,
 }
 
+/// An object that the file names.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
+pub struct ObjectSummary {
+    /// As the file calls it.
+    pub name: String,
+    /// Its middle on the bed, in G-code's coordinates, where the file gives it.
+    pub centre_mm: Option<[f64; 2]>,
+    /// Filament laid for it.
+    pub filament_mm: f64,
+}
+
 /// What a file holds, and what is wrong with it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
@@ -122,6 +134,8 @@ pub struct PreviewSummary {
     pub layers: Vec<LayerSummary>,
     /// The kinds of extrusion that occur.
     pub features: Vec<FeatureSummary>,
+    /// The objects that the file names, at most 254; the first has number 1 in the vertices.
+    pub objects: Vec<ObjectSummary>,
     /// Print time of the whole, planned for the machine; `null` without one, or where the plan fails.
     pub print_time_s: Option<f64>,
     /// Of it, moving without extruding, and waiting where the file says so.
@@ -148,6 +162,11 @@ impl PreviewSummary {
             time_s: feature.time.0,
             filament_mm: feature.filament.0,
         });
+        let objects = report.objects.into_iter().map(|object| ObjectSummary {
+            name: object.name,
+            centre_mm: object.centre_mm,
+            filament_mm: object.filament.0,
+        });
         Self {
             printable,
             errors: check.errors.iter().map(ErrorMessage::from).collect(),
@@ -166,6 +185,7 @@ impl PreviewSummary {
             clamped: report.clamped,
             layers: layers.collect(),
             features: features.collect(),
+            objects: objects.collect(),
             print_time_s: report.print_time.map(|time| time.0),
             travel_time_s: report.travel_time.0,
             slicer_time_s: report.slicer_time.map(|time| time.0),

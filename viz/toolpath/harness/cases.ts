@@ -4,7 +4,7 @@
  * Units: mm.
  */
 import type { ToolpathHost } from '../src/index';
-import { FLAGS } from '../src/vertex';
+import { EVENTS, FLAGS } from '../src/vertex';
 import { arc, type Made, square, Writer } from './writer';
 
 export interface Case {
@@ -52,8 +52,9 @@ function moves(): Made {
     for (const post of [0, 1]) {
       out.manner.tool = post;
       out.loop(square(post * 8, 0, post * 8 + 4, 4));
-      out.to(post * 8 + 1.5, 0, FLAGS.travel | FLAGS.wipe | FLAGS.retract);
+      out.to(post * 8 + 1.5, 0, FLAGS.travel | FLAGS.wipe | FLAGS.retract, EVENTS.toolChange);
       if (layer === 2 && post === 0) out.to(3, -1.5, FLAGS.travel | FLAGS.pause);
+      if (layer === 1 && post === 1) out.to(14, 3, FLAGS.travel);
     }
   }
   return out.made();
@@ -92,7 +93,6 @@ const valueCase = (look: (host: ToolpathHost) => void): Case => ({
   make: values,
   look: (host) => {
     host.fit(near);
-    host.zoom(0.8, [10, 0]);
     look(host);
   },
 });

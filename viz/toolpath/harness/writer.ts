@@ -65,7 +65,7 @@ export class Writer {
     this.layers.push({ firstVertex: this.layers.length === 0 ? 0 : this.count, zMm: this.z, timeS });
   }
 
-  to(x: number, y: number, flags = 0): void {
+  to(x: number, y: number, flags = 0, events = 0): void {
     if ((this.count + 1) * WORDS_PER_VERTEX > this.#vertices.length) {
       this.#vertices = grown(this.#vertices);
       this.#channels = grown(this.#channels);
@@ -79,6 +79,7 @@ export class Writer {
       tool,
       object,
       layer: Math.max(this.layers.length - 1, 0),
+      events,
       flags: flags | (this.count === 0 ? FLAGS.break : 0),
     });
     this.#plan(Math.hypot(x - this.#at[0], y - this.#at[1], this.z - this.#at[2]));

@@ -11,6 +11,7 @@ import type { Layer } from './layers';
 import { carryOut, type ViewEvent, type ViewRequest, type WorkerRequest } from './messages';
 import type { Theme } from './palette';
 import type { Shown } from './shown';
+import { Source } from './source';
 import type { BedMesh } from './surface';
 import type { CssPx, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
@@ -34,6 +35,7 @@ const canTransfer = (canvas: HTMLCanvasElement): boolean =>
 export class ToolpathHost {
   readonly #onEvent: (event: ViewEvent) => void;
   readonly #worker: Worker | null;
+  readonly #source = new Source((request) => this.send(request));
   #view: ToolpathView | null = null;
   #waiting: ViewRequest[] = [];
   #disposed = false;
@@ -139,8 +141,30 @@ export class ToolpathHost {
   setProjection(projection: Projection): void {
     this.send({ type: 'setProjection', projection });
   }
+  /** The camera goes with the nozzle, as long as that is shown. */
+  setFollow(follow: boolean): void {
+    this.send({ type: 'setFollow', follow });
+  }
+  /** Asks for vertices `first … end − 1`; the answer is the event `slice` with this id. */
+  slice(first: VertexIndex, end: VertexIndex, id: number): void {
+    this.send({ type: 'slice', first, end, id });
+  }
   resize(size: ViewSizePx): void {
     this.send({ type: 'resize', size });
+  }
+
+  /** Requests of the view come from this port too, each with its job (see source.ts). */
+  source(port: MessagePort): void {
+    if (this.#disposed) return port.close();
+    if (this.#worker) this.#post({ type: 'source', port }, [port]);
+    else this.#source.listen(port);
+  }
+
+  /** What comes from the port of jobs before this one is not wanted any more; what is there of them goes. */
+  discard(before: number): void {
+    if (this.#disposed) return;
+    if (this.#worker) this.#post({ type: 'discard', before }, []);
+    else this.#source.discard(before);
   }
 
   send(request: ViewRequest, transfer: Transferable[] = []): void {
@@ -154,6 +178,7 @@ export class ToolpathHost {
     if (this.#disposed) return;
     if (this.#worker) this.#post({ type: 'dispose' }, []);
     this.#disposed = true;
+    this.#source.close();
     this.#view?.dispose();
     this.#waiting = [];
   }

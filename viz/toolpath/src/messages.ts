@@ -2,7 +2,7 @@
  * What the host and the worker of the view say to each other.
  *
  * Requests carry out a method of the view each; `source` hands over a port on which requests may arrive from elsewhere (a
- * worker that makes vertices), so that they do not pass through the main thread.
+ * worker that makes vertices, see source.ts), so that they do not pass through the main thread.
  */
 import type { Bed } from './bed';
 import type { BoxMm, CameraPreset, CameraState, Projection, Vec3 } from './camera';
@@ -42,13 +42,34 @@ export type ViewRequest =
   | { readonly type: 'fit'; readonly direction?: Pick<CameraState, 'azimuth' | 'elevation'> }
   | { readonly type: 'setCamera'; readonly preset: CameraPreset }
   | { readonly type: 'setProjection'; readonly projection: Projection }
+  /** The camera goes with the nozzle. */
+  | { readonly type: 'setFollow'; readonly follow: boolean }
+  | { readonly type: 'slice'; readonly first: VertexIndex; readonly end: VertexIndex; readonly id: number }
   | { readonly type: 'resize'; readonly size: ViewSizePx };
+
+/** A request from elsewhere, for the reading of one file; later readings have greater numbers. */
+export interface SourcedRequest {
+  readonly job: number;
+  readonly request: ViewRequest;
+}
 
 /** What only the worker itself understands. */
 export type WorkerRequest =
   | ViewRequest
   | { readonly type: 'start'; readonly canvas: OffscreenCanvas; readonly size: ViewSizePx }
+  | { readonly type: 'source'; readonly port: MessagePort }
+  | { readonly type: 'discard'; readonly before: number }
   | { readonly type: 'dispose' };
+
+/** Some of the file's vertices, as they are; words as in docs/vertex.md. */
+export interface Slice {
+  readonly first: VertexIndex;
+  /** Null where there is no file. */
+  readonly header: VertexHeader | null;
+  readonly vertices: Uint32Array;
+  /** Of as many of them as are known. */
+  readonly channels: Uint32Array;
+}
 
 export type ViewEvent =
   | { readonly type: 'ready' }
@@ -60,6 +81,7 @@ export type ViewEvent =
   | { readonly type: 'picked'; readonly id: number; readonly vertex: VertexIndex | null }
   /** A PNG; null where none could be made. */
   | { readonly type: 'picture'; readonly id: number; readonly blob: Blob | null }
+  | { readonly type: 'slice'; readonly id: number; readonly slice: Slice }
   | { readonly type: 'contextLost' }
   | { readonly type: 'contextRestored' };
 
@@ -116,6 +138,10 @@ export function carryOut(view: ToolpathView, request: ViewRequest): void {
       return view.setCamera(request.preset);
     case 'setProjection':
       return view.setProjection(request.projection);
+    case 'setFollow':
+      return view.setFollow(request.follow);
+    case 'slice':
+      return view.slice(request.first, request.end, request.id);
     case 'resize':
       return view.resize(request.size);
   }

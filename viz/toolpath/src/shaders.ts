@@ -8,7 +8,7 @@
  */
 import { LEAD_TEXELS, TEXELS_PER_ROW } from './chunks';
 import { COLOUR } from './colour_shader';
-import { FIELDS, FLAGS, featureNumber, SIZE_STEP_MM } from './vertex';
+import { EVENTS, FIELDS, FLAGS, featureNumber, SIZE_STEP_MM } from './vertex';
 
 /** Points of one bead: five at each end. */
 export const POINTS_PER_BEAD = 10;
@@ -263,25 +263,20 @@ uniform vec3 uPause;
 out vec3 vColour;
 flat out int vShape;
 
-uint toolOf(uvec4 v) { return (v.w >> ${FIELDS.tool.shift}) & ${mask(FIELDS.tool.bits)}; }
-
 void main() {
   uvec4 own = vertexAt(gl_VertexID + ${LEAD_TEXELS});
-  uvec4 before = vertexAt(gl_VertexID + ${LEAD_TEXELS - 1});
   uint kind = own.z & uMarkers;
-  // The file's first vertex has none before it.
-  bool changes = uToolChanges && toolOf(own) != toolOf(before) && uBase + uint(gl_VertexID) > 0u;
+  bool changes = uToolChanges && (own.y & ${EVENTS.toolChange}u) != 0u;
   float size = 1.0;
-  uvec4 v = own;
   if ((kind & ${FLAGS.pause}u) != 0u) { vColour = uPause; vShape = ${MARKER_SHAPES.square}; size = 1.7; }
-  else if (changes) { vColour = uToolChange; vShape = ${MARKER_SHAPES.diamond}; size = 2.0; v = before; }
+  else if (changes) { vColour = uToolChange; vShape = ${MARKER_SHAPES.diamond}; size = 2.0; }
   else if ((kind & ${FLAGS.seam}u) != 0u) { vColour = uSeam; vShape = ${MARKER_SHAPES.round}; }
   else if ((kind & ${FLAGS.retract}u) != 0u) { vColour = uRetract; vShape = ${MARKER_SHAPES.down}; size = 1.3; }
   else { vColour = uUnretract; vShape = ${MARKER_SHAPES.up}; size = 1.3; }
   gl_PointSize = uMarkerPx * size;
   gl_Position = NOWHERE;
   if (kind == 0u && !changes) return;
-  vec4 eye = viewMatrix * vec4(placeOf(v), 1.0);
+  vec4 eye = viewMatrix * vec4(placeOf(own), 1.0);
   // In front of the bead that it marks.
   eye.xyz *= 1.0 - 0.4 / max(length(eye.xyz), 1.0);
   gl_Position = projectionMatrix * eye;

@@ -19,6 +19,7 @@ export const FIELDS = {
   feature: { word: 2, shift: 20, bits: 5 },
   layer: { word: 3, shift: 0, bits: 20 },
   tool: { word: 3, shift: 20, bits: 4 },
+  /** 0: none; 255: one beyond those that are told apart. */
   object: { word: 3, shift: 24, bits: 8 },
 } as const;
 
@@ -33,6 +34,13 @@ export const FLAGS = {
   seam: 1 << 29,
   wipe: 1 << 30,
   pause: 2 ** 31,
+} as const;
+
+/** Bits of word 1: what happens where the segment ends. */
+export const EVENTS = {
+  toolChange: 1 << 29,
+  /** A pause for it; `FLAGS.pause` is set too. */
+  filamentChange: 1 << 30,
 } as const;
 
 /** Millimetres of one unit of `width` and `height`. */
@@ -91,6 +99,8 @@ export interface Vertex {
   readonly seam: boolean;
   readonly wipe: boolean;
   readonly pause: boolean;
+  readonly toolChange: boolean;
+  readonly filamentChange: boolean;
 }
 
 /** The value of one field of the vertex at `index`; 0 beyond the end. */
@@ -103,6 +113,11 @@ export function field(words: Uint32Array, index: number, name: FieldName): numbe
 /** True if the vertex at `index` has any of the flags. */
 export function hasFlag(words: Uint32Array, index: number, flags: number): boolean {
   return ((words[index * WORDS_PER_VERTEX + 2] ?? 0) & flags) !== 0;
+}
+
+/** True if any of the events happens at the vertex at `index`. */
+export function hasEvent(words: Uint32Array, index: number, events: number): boolean {
+  return ((words[index * WORDS_PER_VERTEX + 1] ?? 0) & events) !== 0;
 }
 
 export function featureName(feature: number): FeatureName {
@@ -138,6 +153,8 @@ export function decodeVertex(header: VertexHeader, words: Uint32Array, index: Ve
     seam: hasFlag(words, index, FLAGS.seam),
     wipe: hasFlag(words, index, FLAGS.wipe),
     pause: hasFlag(words, index, FLAGS.pause),
+    toolChange: hasEvent(words, index, EVENTS.toolChange),
+    filamentChange: hasEvent(words, index, EVENTS.filamentChange),
   };
 }
 
@@ -152,6 +169,8 @@ export interface VertexInput {
   readonly object?: number;
   /** Any of {@link FLAGS}, or-ed. */
   readonly flags?: number;
+  /** Any of {@link EVENTS}, or-ed. */
+  readonly events?: number;
 }
 
 const place = (name: FieldName, value: number): number => {
@@ -171,7 +190,7 @@ export function encodeVertex(
   const feature = featureNumber(input.feature ?? 'other');
   const base = index * WORDS_PER_VERTEX;
   words[base] = place('x', steps(0)) | place('width', size(input.widthMm));
-  words[base + 1] = place('y', steps(1)) | place('height', size(input.heightMm));
+  words[base + 1] = place('y', steps(1)) | place('height', size(input.heightMm)) | (input.events ?? 0);
   words[base + 2] = place('z', steps(2)) | place('feature', feature) | (input.flags ?? 0);
   words[base + 3] =
     place('layer', input.layer ?? 0) | place('tool', input.tool ?? 0) | place('object', input.object ?? 0);

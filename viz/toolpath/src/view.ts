@@ -29,6 +29,7 @@ import { PALETTES, type Palette, type Theme } from './palette';
 import { ALL_PRINTED } from './path_uniforms';
 import { segmentAt } from './segment';
 import { SHOW_ALL, type Shown, validRange } from './shown';
+import { sliceOf } from './slice';
 import { type BedMesh, isMesh } from './surface';
 import type { CssPx, Ms, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
@@ -74,6 +75,8 @@ export class ToolpathView {
   #mesh: BedMesh | null = null;
   #palette: Palette = PALETTES.light;
   #highlight: VertexIndex | null = null;
+  #nozzleMm: Vec3 | null = null;
+  #follows = false;
   #grown: Ms = 0;
   #rangesTimer: ReturnType<typeof setTimeout> | null = null;
 
@@ -189,7 +192,15 @@ export class ToolpathView {
     const place = at?.every(Number.isFinite) ? at : null;
     if (place === null && !this.#drawing.nozzle.isShown) return;
     this.#drawing.nozzle.at = place;
+    this.#nozzleMm = place;
     this.#loop.overlaid();
+    this.#followNozzle();
+  }
+
+  /** The camera goes with the nozzle, as long as that is shown. */
+  setFollow(follow: boolean): void {
+    this.#follows = follow;
+    this.#followNozzle();
   }
 
   /** Marks the segment that ends at this vertex; null marks none. */
@@ -228,6 +239,15 @@ export class ToolpathView {
 
   picture(id: number, _size: PictureSizePx): void {
     this.#tell({ type: 'picture', id, blob: null });
+  }
+
+  /** Hands out vertices `first … end − 1`, as far as they are there. */
+  slice(first: VertexIndex, end: VertexIndex, id: number): void {
+    const { content } = this.#model;
+    const range = { first, end };
+    const vertices = content ? sliceOf(content.store, range) : new Uint32Array();
+    const channels = content ? sliceOf(content.channels, range) : new Uint32Array();
+    this.#tell({ type: 'slice', id, slice: { first, header: content?.header ?? null, vertices, channels } });
   }
 
   setTheme(theme: Theme): void {
@@ -298,6 +318,14 @@ export class ToolpathView {
   #move(camera: CameraState): void {
     this.#model.camera = camera;
     this.#loop.moved();
+  }
+
+  #followNozzle(): void {
+    const at = this.#nozzleMm;
+    const { camera } = this.#model;
+    if (!this.#follows || !at) return;
+    const [x, y, z] = camera.targetMm;
+    if (x !== at[0] || y !== at[1] || z !== at[2]) this.#move({ ...camera, targetMm: at });
   }
 
   #hasGrown(): void {

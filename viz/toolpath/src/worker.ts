@@ -4,6 +4,7 @@
  * Does not know: the page. A module worker; the first message must be `start`.
  */
 import { carryOut, type ViewEvent, type WorkerRequest } from './messages';
+import { Source } from './source';
 import { ToolpathView } from './view';
 
 /** The part of a dedicated worker's global that is used here (the window's types are what is compiled against). */
@@ -15,6 +16,7 @@ interface WorkerScope {
 
 const scope = self as unknown as WorkerScope;
 let view: ToolpathView | null = null;
+const source = new Source((request) => view && carryOut(view, request));
 
 function start(request: Extract<WorkerRequest, { type: 'start' }>): void {
   try {
@@ -29,7 +31,12 @@ function receive({ data: request }: MessageEvent<WorkerRequest>): void {
   switch (request.type) {
     case 'start':
       return start(request);
+    case 'source':
+      return source.listen(request.port);
+    case 'discard':
+      return source.discard(request.before);
     case 'dispose':
+      source.close();
       view?.dispose();
       return scope.close();
     default:

@@ -32,6 +32,8 @@ const REQUESTS: readonly (readonly [ViewRequest, readonly unknown[]])[] = [
   [{ type: 'pick', x: 1, y: 2, id: 3 }, [1, 2, 3]],
   [{ type: 'picture', id: 3, size: { width: 4, height: 5 } }, [3, { width: 4, height: 5 }]],
   [{ type: 'setCamera', preset: 'top' }, ['top']],
+  [{ type: 'setFollow', follow: true }, [true]],
+  [{ type: 'slice', first: 2, end: 4, id: 9 }, [2, 4, 9]],
   [{ type: 'setProjection', projection: 'orthographic' }, ['orthographic']],
 ];
 

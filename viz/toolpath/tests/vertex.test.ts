@@ -1,9 +1,20 @@
 import { describe, expect, test } from 'vitest';
-import { decodeVertex, encodeVertex, FEATURES, FIELDS, FLAGS, featureNumber } from '../src/vertex';
+import { decodeVertex, EVENTS, encodeVertex, FEATURES, FIELDS, FLAGS, featureNumber } from '../src/vertex';
 
 const HEADER = { originMm: [-10, -20, 0], stepMm: 2 ** -10 } as const;
 /** The test vector of docs/vertex.md. */
 const VECTOR = new Uint32Array([0x06e05a00, 0x0320c900, 0x20100133, 0x00100007]);
+const EVENTFUL = new Uint32Array([0x06e05a00, 0x6320c900, 0x20100133, 0x03100007]);
+
+const VERTEX = {
+  positionMm: [12.5, 30.25, 0.3],
+  widthMm: 0.44,
+  heightMm: 0.2,
+  feature: 'outerWall',
+  layer: 7,
+  tool: 1,
+  flags: FLAGS.seam,
+} as const;
 
 describe('the bits of a vertex', () => {
   test('the documented test vector is decoded', () => {
@@ -20,21 +31,29 @@ describe('the bits of a vertex', () => {
       seam: true,
       travel: false,
       break: false,
+      object: 0,
+      toolChange: false,
+      pause: false,
+      filamentChange: false,
+    });
+    expect(decodeVertex(HEADER, EVENTFUL, 0)).toMatchObject({
+      widthMm: vertex.widthMm,
+      heightMm: vertex.heightMm,
+      tool: 1,
+      object: 3,
+      toolChange: true,
+      pause: false,
+      filamentChange: true,
     });
   });
 
   test('and encoded to the same words', () => {
     const words = new Uint32Array(4);
-    encodeVertex(HEADER, words, 0, {
-      positionMm: [12.5, 30.25, 0.3],
-      widthMm: 0.44,
-      heightMm: 0.2,
-      feature: 'outerWall',
-      layer: 7,
-      tool: 1,
-      flags: FLAGS.seam,
-    });
+    encodeVertex(HEADER, words, 0, VERTEX);
     expect([...words]).toEqual([...VECTOR]);
+    const events = EVENTS.toolChange + EVENTS.filamentChange;
+    encodeVertex(HEADER, words, 0, { ...VERTEX, object: 3, events });
+    expect([...words]).toEqual([...EVENTFUL]);
   });
 
   test('no two fields share a bit', () => {
@@ -44,9 +63,14 @@ describe('the bits of a vertex', () => {
       expect((used[word] ?? 0) & mask).toBe(0);
       used[word] = ((used[word] ?? 0) | mask) >>> 0;
     }
-    for (const flag of Object.values(FLAGS)) {
-      expect((used[2] ?? 0) & flag).toBe(0);
-      used[2] = ((used[2] ?? 0) | flag) >>> 0;
+    for (const [word, bits] of [
+      [1, EVENTS],
+      [2, FLAGS],
+    ] as const) {
+      for (const bit of Object.values(bits)) {
+        expect((used[word] ?? 0) & bit).toBe(0);
+        used[word] = ((used[word] ?? 0) | bit) >>> 0;
+      }
     }
   });
 
@@ -58,18 +82,26 @@ describe('the bits of a vertex', () => {
       heightMm: 99,
       layer: 1e9,
       tool: 99,
+      object: 1e9,
     });
     const vertex = decodeVertex(HEADER, words, 0);
     expect(vertex.positionMm[0]).toBeCloseTo(-10 + (2 ** 20 - 1) / 1024, 6);
     expect(vertex.positionMm[1]).toBe(-20);
     expect(vertex.widthMm).toBeCloseTo(4.092, 6);
     expect(vertex.heightMm).toBeCloseTo(2.044, 6);
-    expect(vertex).toMatchObject({ layer: 2 ** 20 - 1, tool: 15, feature: 'other', travel: false });
+    expect(vertex).toMatchObject({
+      layer: 2 ** 20 - 1,
+      tool: 15,
+      object: 255,
+      feature: 'other',
+      travel: false,
+      pause: false,
+    });
   });
+});
 
-  test('features keep the numbers of the document', () => {
-    expect(FEATURES).toHaveLength(17);
-    expect(featureNumber('bridge')).toBe(8);
-    expect(featureNumber('other')).toBe(16);
-  });
+test('features keep the numbers of the document', () => {
+  expect(FEATURES).toHaveLength(17);
+  expect(featureNumber('bridge')).toBe(8);
+  expect(featureNumber('other')).toBe(16);
 });

@@ -4,6 +4,7 @@ import type { Finding } from './Finding';
 import type { Blocking } from './Blocking';
 import type { LayerSummary } from './LayerSummary';
 import type { FeatureSummary } from './FeatureSummary';
+import type { ObjectSummary } from './ObjectSummary';
 import type { Mm, Seconds } from './units';
 
 /**
@@ -62,6 +63,10 @@ layers: Array<LayerSummary>,
  * The kinds of extrusion that occur.
  */
 features: Array<FeatureSummary>, 
+/**
+ * The objects that the file names, at most 254; the first has number 1 in the vertices.
+ */
+objects: Array<ObjectSummary>, 
 /**
  * Print time of the whole, planned for the machine; `null` without one, or where the plan fails.
  */

@@ -82,18 +82,19 @@ function followNozzle(host: ToolpathHost): () => void {
 /** Lets the view follow the page's state; returns what ends that. */
 function follow(host: ToolpathHost): () => void {
   setSink({
-    begin: (header) => host.begin(header),
-    append: (vertices) => host.append(vertices),
-    finish: ({ layers }) => {
-      host.setLayers(layers.map(({ first, z }) => ({ firstVertex: first, zMm: z })));
-      host.end();
-      host.fit();
-    },
-    clear: () => {
+    source: (port) => host.source(port),
+    discard: (before) => {
       topLayer.value = null;
-      host.clear();
-      host.fit();
+      host.discard(before);
     },
+    finish: ({ layers, time }) =>
+      host.setLayers(
+        layers.map(({ first, z, time: timeS }) => ({
+          firstVertex: first,
+          zMm: z,
+          ...(time === null ? {} : { timeS }),
+        })),
+      ),
   });
   const ends = [
     effect(() => host.setTheme(isDark.value ? 'dark' : 'light')),

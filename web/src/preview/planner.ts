@@ -8,7 +8,7 @@ import type { Trouble } from '../machine/protocol';
 import { notGcode } from '../machine/troubles';
 import { inWords, plannerTrouble } from '../planner_error';
 import { celsius, mm, seconds } from '../units';
-import type { ConfigReport, Summary, VertexHeader } from './protocol';
+import type { ConfigReport, Summary, Thumbnail, VertexHeader } from './protocol';
 
 /** A file being read. */
 export interface FilePreview {
@@ -21,6 +21,12 @@ export interface FilePreview {
   takeVertices(): Uint32Array<ArrayBuffer>;
   /** Pairs of a line and the vertex where its segment ends, new since last time. */
   takeMarks(): Uint32Array<ArrayBuffer>;
+  /** How many lines further than the one before it each vertex comes from, new since last time; 255 where a mark says. */
+  takeLineSteps(): Uint8Array<ArrayBuffer>;
+  /** The file's pictures of the print, new since last time. */
+  takeThumbnails(): readonly Thumbnail[];
+  /** What the planner knows of the vertices, in their order, later than they come; new since last time. */
+  takeChannels(): Uint32Array<ArrayBuffer>;
   /** After `finish`. */
   summary(): Summary;
   free(): void;
@@ -100,6 +106,11 @@ function fromSummary(summary: PreviewSummary): Summary {
       time: seconds(time_s),
       filament: mm(filament_mm),
     })),
+    objects: summary.objects.map(({ name, centre_mm, filament_mm }) => ({
+      name,
+      centre: centre_mm && [mm(centre_mm[0]), mm(centre_mm[1])],
+      filament: mm(filament_mm),
+    })),
     generator: summary.generator,
   };
 }
@@ -134,6 +145,23 @@ class WasmPreview implements FilePreview {
 
   takeMarks(): Uint32Array<ArrayBuffer> {
     return this.#inner.take_marks() as Uint32Array<ArrayBuffer>;
+  }
+
+  takeLineSteps(): Uint8Array<ArrayBuffer> {
+    return this.#inner.take_line_steps() as Uint8Array<ArrayBuffer>;
+  }
+
+  takeThumbnails(): readonly Thumbnail[] {
+    return this.#inner.take_thumbnails().map((thumbnail) => {
+      const { mime, width, height } = thumbnail;
+      const picture = new Blob([thumbnail.bytes as Uint8Array<ArrayBuffer>], { type: mime });
+      thumbnail.free();
+      return { picture, width, height };
+    });
+  }
+
+  takeChannels(): Uint32Array<ArrayBuffer> {
+    return new Uint32Array();
   }
 
   summary(): Summary {

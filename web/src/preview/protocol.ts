@@ -27,6 +27,23 @@ export interface FeatureShare {
   readonly filament: Mm;
 }
 
+/** An object that a file names. */
+export interface ObjectShare {
+  readonly name: string;
+  /** Its middle on the bed, in G-code's coordinates, where the file gives it. */
+  readonly centre: readonly [Mm, Mm] | null;
+  readonly filament: Mm;
+}
+
+/** A picture of the print that its slicer put into the file. */
+export interface Thumbnail {
+  /** PNG or JPEG. */
+  readonly picture: Blob;
+  /** In pixels. */
+  readonly width: number;
+  readonly height: number;
+}
+
 /** What a file amounts to on the machine that was given. */
 export interface Summary {
   readonly errors: readonly Trouble[];
@@ -44,6 +61,8 @@ export interface Summary {
   /** From the planner; null where the machine is not known. */
   readonly time: Seconds | null;
   readonly features: readonly FeatureShare[];
+  /** The first has number 1 in the vertices. */
+  readonly objects: readonly ObjectShare[];
   /** The program that wrote the file, where it says so. */
   readonly generator: string | null;
 }
@@ -93,6 +112,18 @@ export type ToPreview =
       readonly name: string;
       readonly config: string | null;
     }
+  /** Nothing is to be read any more, or shown of what was. */
+  | { readonly kind: 'close'; readonly job: number }
+  /** Where the geometry goes: requests of the 3D view, each with its job, past the page's main thread. */
+  | { readonly kind: 'draw'; readonly port: MessagePort }
+  /** Asks for lines of the open file, as far as it has been read; what was asked before is of no interest any more. */
+  | {
+      readonly kind: 'text';
+      readonly id: number;
+      readonly job: number;
+      readonly first: number;
+      readonly last: number;
+    }
   | { readonly kind: 'check-config'; readonly id: number; readonly text: string }
   /** Asks for lines of a file; what was asked before is of no interest any more. */
   | {
@@ -106,12 +137,15 @@ export type ToPreview =
 export type FromPreview =
   | { readonly kind: 'loaded' }
   | { readonly kind: 'failed'; readonly job: number | null; readonly trouble: Trouble }
-  | { readonly kind: 'begun'; readonly job: number; readonly header: VertexHeader }
-  | { readonly kind: 'vertices'; readonly job: number; readonly vertices: Uint32Array<ArrayBuffer> }
   /** Pairs of a line and the vertex where its segment ends, some dozens of vertices apart, in order. */
   | { readonly kind: 'marks'; readonly job: number; readonly marks: Uint32Array<ArrayBuffer> }
-  | { readonly kind: 'progress'; readonly job: number; readonly bytes: number }
+  /** One byte a vertex, in order: how many lines further than the one before it it comes from; 255 where a mark says. */
+  | { readonly kind: 'line-steps'; readonly job: number; readonly steps: Uint8Array<ArrayBuffer> }
+  | { readonly kind: 'thumbnails'; readonly job: number; readonly thumbnails: readonly Thumbnail[] }
+  | { readonly kind: 'progress'; readonly job: number; readonly bytes: number; readonly lines: number }
   | { readonly kind: 'summary'; readonly job: number; readonly summary: Summary }
   /** Fewer where the file ends before; none where it cannot be read. */
   | { readonly kind: 'lines'; readonly id: number; readonly texts: readonly string[] }
+  /** Answers `text`; fewer where the file ends before, none where another question came meanwhile. */
+  | { readonly kind: 'text'; readonly id: number; readonly texts: readonly string[] }
   | { readonly kind: 'config'; readonly id: number; readonly report: ConfigReport };

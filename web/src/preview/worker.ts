@@ -1,7 +1,9 @@
 // The preview worker: reads a file through the planner's preview and hands out geometry, findings and estimates. Also
 // checks printer.cfg texts. One file at a time: a new one ends the reading of the one before.
-import { FileChunks, linesOf } from '../files';
+import type { SourcedRequest, ViewRequest } from '@stepcast/toolpath';
+import { FileChunks, linesOf, type Packing, packingOf } from '../files';
 import { fileUnreadable, plannerMissing } from '../machine/troubles';
+import { LineIndex } from './line_index';
 import { type FilePreview, loadReader, type Reader } from './planner';
 import type { FromPreview, ToPreview } from './protocol';
 
@@ -30,11 +32,56 @@ function openPreview(reader: Reader, config: string | null): FilePreview {
   }
 }
 
+/** The 3D view, where there is one. */
+let drawing: MessagePort | undefined;
+
+function draw(job: number, request: ViewRequest, transfer: Transferable[] = []): void {
+  const message: SourcedRequest = { job, request };
+  drawing?.postMessage(message, transfer);
+}
+
+/** The file that is open, for questions about its text. */
+interface Opened {
+  readonly job: number;
+  readonly file: Blob;
+  readonly packing: Packing;
+  readonly index: LineIndex;
+}
+let opened: Opened | undefined;
+
+/** Hands out what came of the bytes that were fed. */
+function pass(preview: FilePreview, job: number): void {
+  for (;;) {
+    const vertices = preview.takeVertices();
+    const marks = preview.takeMarks();
+    if (marks.length > 0) tell({ kind: 'marks', job, marks }, [marks.buffer]);
+    const steps = preview.takeLineSteps();
+    if (steps.length > 0) tell({ kind: 'line-steps', job, steps }, [steps.buffer]);
+    const thumbnails = preview.takeThumbnails();
+    if (thumbnails.length > 0) tell({ kind: 'thumbnails', job, thumbnails });
+    if (vertices.length > 0) draw(job, { type: 'append', vertices }, [vertices.buffer]);
+    const words = preview.takeChannels();
+    if (words.length > 0) draw(job, { type: 'appendChannels', words }, [words.buffer]);
+    if (vertices.length === 0) return;
+  }
+}
+
+function feed(preview: FilePreview, job: number, chunk: Uint8Array): void {
+  for (let rest = chunk; rest.byteLength > 0; ) {
+    const piece = rest.subarray(0, preview.wants());
+    if (piece.byteLength === 0) throw new Error('the preview wants nothing more');
+    preview.feed(piece);
+    pass(preview, job);
+    rest = rest.subarray(piece.byteLength);
+  }
+}
+
 async function read(
   reader: Reader,
   { job, file, name, config }: ToPreview & { kind: 'open' },
 ): Promise<void> {
-  const chunks = await FileChunks.open(file);
+  const packing = await packingOf(file);
+  const chunks = await FileChunks.open(file, packing);
   const first = await chunks.next();
   const refusal = reader.refuse(first ?? new Uint8Array(), name.replace(/\.gz$/i, ''));
   if (refusal) {
@@ -42,38 +89,25 @@ async function read(
     return tell({ kind: 'failed', job, trouble: refusal });
   }
   const preview = openPreview(reader, config);
-  const pass = (): void => {
-    for (;;) {
-      const vertices = preview.takeVertices();
-      const marks = preview.takeMarks();
-      if (marks.length > 0) tell({ kind: 'marks', job, marks }, [marks.buffer]);
-      if (vertices.length === 0) return;
-      tell({ kind: 'vertices', job, vertices }, [vertices.buffer]);
-    }
-  };
-  const feed = (chunk: Uint8Array): void => {
-    for (let rest = chunk; rest.byteLength > 0; ) {
-      const piece = rest.subarray(0, preview.wants());
-      if (piece.byteLength === 0) throw new Error('the preview wants nothing more');
-      preview.feed(piece);
-      pass();
-      rest = rest.subarray(piece.byteLength);
-    }
-  };
+  const index = new LineIndex();
+  if (current === job) opened = { job, file, packing, index };
   try {
     let told = 0;
-    tell({ kind: 'begun', job, header: preview.header() });
+    draw(job, { type: 'begin', header: preview.header() });
     for (let chunk = first; chunk; chunk = await chunks.next()) {
       if (current !== job) return;
-      feed(chunk);
+      index.add(chunk);
+      feed(preview, job, chunk);
       if (performance.now() - told > PROGRESS_MS) {
         told = performance.now();
-        tell({ kind: 'progress', job, bytes: chunks.bytesRead });
+        tell({ kind: 'progress', job, bytes: chunks.bytesRead, lines: index.lines });
       }
     }
     preview.finish();
-    pass();
+    pass(preview, job);
+    draw(job, { type: 'end' });
     tell({ kind: 'summary', job, summary: preview.summary() });
+    draw(job, { type: 'fit' });
   } finally {
     preview.free();
     await chunks.cancel();
@@ -81,7 +115,7 @@ async function read(
 }
 
 async function open(message: ToPreview & { kind: 'open' }): Promise<void> {
-  current = message.job;
+  close(message.job);
   let reader: Reader;
   try {
     reader = await load();
@@ -112,10 +146,45 @@ async function tellLines({ id, file, first, last }: ToPreview & { kind: 'lines' 
   if (asked === id) tell({ kind: 'lines', id, texts });
 }
 
+/** The last question for the open file's text. */
+let textAsked = 0;
+
+/** Any line is found by reading a few tens of kilobytes, but in a packed file, which is read from its beginning. */
+async function textOf(open: Opened, first: number, last: number, id: number): Promise<string[]> {
+  const isWanted = (): boolean => textAsked === id && opened === open;
+  if (open.packing === 'gzip') return await linesOf(open.file, first, last, isWanted, 'gzip');
+  const { line, offset } = open.index.before(first);
+  return await linesOf(open.file.slice(offset), first - line + 1, last - line + 1, isWanted, 'plain');
+}
+
+async function tellText({ id, job, first, last }: ToPreview & { kind: 'text' }): Promise<void> {
+  textAsked = id;
+  const open = opened?.job === job ? opened : undefined;
+  const texts = open ? await textOf(open, first, last, id).catch(() => []) : [];
+  tell({ kind: 'text', id, texts: textAsked === id ? texts : [] });
+}
+
+function close(job: number): void {
+  current = job;
+  opened = undefined;
+}
+
 self.onmessage = ({ data }: MessageEvent<ToPreview>): void => {
-  if (data.kind === 'open') void open(data);
-  else if (data.kind === 'lines') void tellLines(data);
-  else void checkConfig(data);
+  switch (data.kind) {
+    case 'open':
+      return void open(data);
+    case 'close':
+      return close(data.job);
+    case 'draw':
+      drawing = data.port;
+      return;
+    case 'lines':
+      return void tellLines(data);
+    case 'text':
+      return void tellText(data);
+    case 'check-config':
+      return void checkConfig(data);
+  }
 };
 
 load().then(

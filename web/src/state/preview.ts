@@ -3,7 +3,7 @@
 import { effect, signal } from '@preact/signals';
 import type { Trouble } from '../machine/protocol';
 import { previewDied } from '../machine/troubles';
-import type { ConfigReport, FromPreview, Summary, ToPreview, VertexHeader } from '../preview/protocol';
+import type { ConfigReport, FromPreview, Summary, Thumbnail, ToPreview } from '../preview/protocol';
 import { note } from './log';
 import { LineMarks } from './marks';
 import { activeProfile } from './profiles';
@@ -15,10 +15,11 @@ export interface OpenFile {
 
 /** Takes the geometry as it comes; the 3D view, or nobody. */
 export interface GeometrySink {
-  begin(header: VertexHeader): void;
-  append(vertices: Uint32Array<ArrayBuffer>): void;
+  /** Here it comes from, straight from the worker that makes it. */
+  source(port: MessagePort): void;
+  /** What comes of jobs before this one is not wanted any more. */
+  discard(before: number): void;
   finish(summary: Summary): void;
-  clear(): void;
 }
 
 export const file = signal<OpenFile | null>(null);
@@ -26,6 +27,10 @@ export const file = signal<OpenFile | null>(null);
 export const reading = signal<number | null>(null);
 export const summary = signal<Summary | null>(null);
 export const failure = signal<Trouble | null>(null);
+/** Lines that have been read of it so far. */
+export const linesRead = signal(0);
+/** The pictures of the print that are in it; a handful at most. */
+export const thumbnails = signal<readonly Thumbnail[]>([]);
 export const confirmed = signal<ReadonlySet<number>>(new Set());
 
 /** A worker that stops this often without having read anything in between is not started again. */
@@ -36,6 +41,8 @@ let deaths = 0;
 let lastDeath: Trouble | undefined;
 let job = 0;
 let sink: GeometrySink | undefined;
+/** The geometry's end for a sink that is not there yet. */
+let source: MessagePort | undefined;
 let configId = 0;
 let marks = new LineMarks();
 interface WaitingCheck {
@@ -45,8 +52,13 @@ interface WaitingCheck {
   isRepeated: boolean;
 }
 const configs = new Map<number, WaitingCheck>();
-/** The last question for lines of a file; those before it are not answered. */
-let lookingAt: { readonly id: number; readonly settle: (texts: readonly string[]) => void } | undefined;
+interface Question {
+  readonly id: number;
+  readonly settle: (texts: readonly string[]) => void;
+}
+/** The last question for lines of a file, and for the text of the open one; those before it are not answered. */
+let lookingAt: Question | undefined;
+let readingAt: Question | undefined;
 
 function startWorker(): void {
   const started = new Worker(new URL('../preview/worker.ts', import.meta.url), {
@@ -62,6 +74,16 @@ function startWorker(): void {
     if (worker === started) died(event.message || 'its script could not be loaded');
   };
   worker = started;
+  const { port1, port2 } = new MessageChannel();
+  started.postMessage({ kind: 'draw', port: port1 } satisfies ToPreview, [port1]);
+  source = port2;
+  connect();
+}
+
+function connect(): void {
+  if (!sink || !source) return;
+  sink.source(source);
+  source = undefined;
 }
 
 /** What was being read is given up, what was being checked cannot be said. */
@@ -76,8 +98,9 @@ function died(message: string): void {
     reading.value = null;
     failure.value = lastDeath;
   }
-  lookingAt?.settle([]);
+  for (const question of [lookingAt, readingAt]) question?.settle([]);
   lookingAt = undefined;
+  readingAt = undefined;
   if (deaths <= DEATHS_MAX) startWorker();
   for (const [id, check] of configs) {
     if (check.isRepeated || !worker) {
@@ -113,6 +136,7 @@ export const lineMarks = (): LineMarks => marks;
 
 export function setSink(taker: GeometrySink): void {
   sink = taker;
+  connect();
 }
 
 function read(config: string): void {
@@ -124,7 +148,9 @@ function read(config: string): void {
   failure.value = null;
   confirmed.value = new Set();
   marks = new LineMarks();
-  sink?.clear();
+  linesRead.value = 0;
+  thumbnails.value = [];
+  sink?.discard(job);
   if (!worker && lastDeath) {
     reading.value = null;
     failure.value = lastDeath;
@@ -145,7 +171,10 @@ export function closeFile(): void {
   reading.value = null;
   summary.value = null;
   failure.value = null;
-  sink?.clear();
+  linesRead.value = 0;
+  thumbnails.value = [];
+  sink?.discard(job);
+  send({ kind: 'close', job });
 }
 
 /** Reads a printer.cfg and says what is wrong with it, by line. */
@@ -171,8 +200,26 @@ export function linesOf(blob: Blob, first: number, last: number): Promise<readon
   });
 }
 
+/** Lines of the file that is shown; none where they cannot be read, or others were asked for meanwhile. */
+export function textOf(first: number, last: number): Promise<readonly string[]> {
+  readingAt?.settle([]);
+  configId += 1;
+  const id = configId;
+  return new Promise((settle) => {
+    if (!worker || !file.peek()) return settle([]);
+    readingAt = { id, settle };
+    send({ kind: 'text', id, job, first, last });
+  });
+}
+
 function take(message: FromPreview): void {
   if (message.kind === 'loaded') return;
+  if (message.kind === 'text') {
+    if (readingAt?.id !== message.id) return;
+    readingAt.settle(message.texts);
+    readingAt = undefined;
+    return;
+  }
   if (message.kind === 'lines') {
     if (lookingAt?.id !== message.id) return;
     lookingAt.settle(message.texts);
@@ -187,21 +234,23 @@ function take(message: FromPreview): void {
   // What is still on its way from a file that was put away.
   if (message.job !== null && message.job !== job) return;
   switch (message.kind) {
-    case 'begun':
-      sink?.begin(message.header);
-      break;
-    case 'vertices':
-      sink?.append(message.vertices);
-      break;
     case 'marks':
       marks.append(message.marks);
       break;
+    case 'line-steps':
+      marks.appendSteps(message.steps);
+      break;
+    case 'thumbnails':
+      thumbnails.value = [...thumbnails.value, ...message.thumbnails];
+      break;
     case 'progress':
       reading.value = Math.min(1, message.bytes / Math.max(1, file.value?.blob.size ?? 1));
+      linesRead.value = message.lines;
       break;
     case 'summary':
       deaths = 0;
       reading.value = null;
+      linesRead.value = message.summary.lines;
       summary.value = message.summary;
       sink?.finish(message.summary);
       break;

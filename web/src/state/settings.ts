@@ -1,5 +1,6 @@
 // The user's settings, kept in this browser. What is stored is not trusted: a value that does not fit is the default.
 import { effect, signal } from '@preact/signals';
+import { COLOUR_MODES, type ColourMode } from '@stepcast/toolpath';
 
 export type Theme = 'system' | 'light' | 'dark';
 
@@ -25,7 +26,19 @@ export interface Settings {
   readonly extrudeLength: number;
   /** mm of filament a second. */
   readonly extrudeSpeed: number;
+  /** A colour mode of the 3D view. */
+  readonly colourBy: ColourMode;
   readonly showTravel: boolean;
+  readonly showWipes: boolean;
+  readonly showRetractions: boolean;
+  readonly showSeams: boolean;
+  readonly showToolChanges: boolean;
+  readonly showPauses: boolean;
+  readonly isOrthographic: boolean;
+  /** The camera goes with the nozzle while something is printed. */
+  readonly followNozzle: boolean;
+  /** The file's text beside the 3D view. */
+  readonly showText: boolean;
   readonly showInstruments: boolean;
   /** Notifications about prints while the page is hidden. */
   readonly notifications: boolean;
@@ -55,7 +68,16 @@ export const DEFAULTS: Settings = {
   jogStep: 10,
   extrudeLength: 5,
   extrudeSpeed: 3,
+  colourBy: 'feature',
   showTravel: false,
+  showWipes: false,
+  showRetractions: false,
+  showSeams: false,
+  showToolChanges: false,
+  showPauses: false,
+  isOrthographic: false,
+  followNozzle: false,
+  showText: false,
   showInstruments: false,
   notifications: false,
   knowsPinning: false,
@@ -101,7 +123,16 @@ export function readSettings(text: string | null): Settings {
     jogStep: oneOf(stored.jogStep, JOG_STEPS, DEFAULTS.jogStep),
     extrudeLength: between(stored.extrudeLength, 0.1, EXTRUDE_MAX_MM, DEFAULTS.extrudeLength),
     extrudeSpeed: between(stored.extrudeSpeed, 0.1, EXTRUDE_SPEED_MAX_MM_S, DEFAULTS.extrudeSpeed),
+    colourBy: oneOf(stored.colourBy, COLOUR_MODES, DEFAULTS.colourBy),
     showTravel: stored.showTravel === true,
+    showWipes: stored.showWipes === true,
+    showRetractions: stored.showRetractions === true,
+    showSeams: stored.showSeams === true,
+    showToolChanges: stored.showToolChanges === true,
+    showPauses: stored.showPauses === true,
+    isOrthographic: stored.isOrthographic === true,
+    followNozzle: stored.followNozzle === true,
+    showText: stored.showText === true,
     showInstruments: stored.showInstruments === true,
     notifications: stored.notifications === true,
     knowsPinning: stored.knowsPinning === true,

@@ -321,14 +321,18 @@ impl Interpreter {
     }
 
     fn object_actions(
-        &self,
+        &mut self,
         label: Option<String>,
         out: &mut Out<'_>,
     ) -> Result<[Option<ObjectAction>; 6], Said> {
         let by_index = |index: Option<u32>| index.map(ObjectId::Index);
         let none_starts = self.words.get(b'S').is_some_and(|value| value < 0.0);
         let started = if none_starts { None } else { self.index(b'S', out)? };
-        let define = by_index(started).filter(|_| label.is_some()).map(|id| ObjectAction::Define {
+        if none_starts || started.is_some() {
+            self.object = started;
+        }
+        // A label alone is that of the object in hand.
+        let define = by_index(self.object).filter(|_| label.is_some()).map(|id| ObjectAction::Define {
             id,
             label,
             centre: None,

@@ -14,7 +14,7 @@ use core::ops::Range;
 use units::MmPerS;
 
 use crate::action::{Action, Move, Position};
-use crate::annotation;
+use crate::annotation::{self, Pictures};
 use crate::arc::Plane;
 use crate::diagnostic::{Diagnostic, DiagnosticCode, Severity};
 use crate::lines::{LINE_BYTES_MAX, LineNumber};
@@ -97,7 +97,9 @@ pub struct Interpreter {
     accel: Option<f64>,
     /// The `N` of the last line that had one.
     last_number: Option<i64>,
-    in_thumbnail: bool,
+    pictures: Pictures,
+    /// The object that `M486 S` has named last.
+    object: Option<u32>,
 }
 
 /// Where a line's results go.
@@ -174,7 +176,8 @@ impl Interpreter {
             hop: 0.0,
             accel: None,
             last_number: None,
-            in_thumbnail: false,
+            pictures: Pictures::default(),
+            object: None,
         }
     }
 
@@ -202,12 +205,18 @@ impl Interpreter {
             }
             b'A'..=b'Z' | b'a'..=b'z' | b'_' => self.command(bytes, at, &mut out),
             b';' => {
-                annotation::read(&bytes[at + 1..], &mut self.in_thumbnail, |a| {
+                annotation::read(&bytes[at + 1..], &mut self.pictures, |a| {
                     out.act(Action::Annotation(a));
                 });
             }
             _ => self.odd(bytes, at, &mut out),
         }
+    }
+
+    /// From here on, pictures in comments are told as [`Annotation::Picture`](crate::Annotation::Picture); otherwise nobody
+    /// has to carry them.
+    pub fn show_pictures(&mut self) {
+        self.pictures.shown = true;
     }
 
     /// The position commanded so far. `e` is the running total of filament.
@@ -285,7 +294,7 @@ impl Interpreter {
     /// A line that begins with a command.
     #[inline]
     fn command(&mut self, bytes: &[u8], at: usize, out: &mut Out<'_>) {
-        self.in_thumbnail = false;
+        self.pictures.within = false;
         let letter = bytes[at].to_ascii_uppercase();
         let (number, end) = digits(bytes, at + 1);
         let Some(number) = number else {

@@ -6,12 +6,15 @@
 use gcode::{Annotation, Move};
 
 use super::layers::Layers;
+use super::objects::Objects;
 use super::vertex::{FEATURES, Flags, Grid, Vertex, feature_number, height_units, width_units};
 
 /// The most vertices of a file: 4 GiB of them.
 pub const VERTICES_MAX: u32 = 1 << 28;
-/// A line's number is told for one vertex in so many.
+/// A line's number is told for one vertex in so many at least.
 const MARK_INTERVAL: u32 = 32;
+/// A vertex that comes so many lines behind the one before has a mark of its own.
+const LINE_STEP_MAX: u32 = 255;
 /// Places nearer than this are the same.
 const SAME_PLACE_MM: f64 = 1e-6;
 /// A loop has at least so many segments.
@@ -55,7 +58,10 @@ pub(super) struct Encoder {
     height_mm: Option<f64>,
     tool: u32,
     wall: Option<Loop>,
+    /// What happened where no vertex is yet.
+    pending: Flags,
     next_mark: u32,
+    last_line: u32,
     /// Vertices, the held one among them.
     pub(super) count: u32,
     pub(super) clamped: u64,
@@ -64,6 +70,9 @@ pub(super) struct Encoder {
     pub(super) filament_mm: [f64; FEATURES],
     /// Pairs of a line and the vertex at which its segment ends.
     pub(super) marks: Vec<u32>,
+    /// How many lines further each vertex comes from than the one before it.
+    pub(super) line_steps: Vec<u8>,
+    pub(super) objects: Objects,
 }
 
 const fn place(position: gcode::Position) -> [f64; 3] {
@@ -88,13 +97,17 @@ impl Encoder {
             height_mm: None,
             tool: 0,
             wall: None,
+            pending: Flags::default(),
             next_mark: 0,
+            last_line: 0,
             count: 0,
             clamped: 0,
             left_out: 0,
             layers: Layers::new(),
             filament_mm: [0.0; FEATURES],
             marks: Vec::new(),
+            line_steps: Vec::new(),
+            objects: Objects::default(),
         }
     }
 
@@ -108,7 +121,19 @@ impl Encoder {
     }
 
     pub(super) fn select_tool(&mut self, tool: u32) {
+        // The first one is not changed to.
+        if tool != self.tool && self.count > 0 {
+            self.event(Flags::TOOL_CHANGE);
+        }
         self.tool = tool;
+    }
+
+    /// Something happens where the nozzle is.
+    pub(super) fn event(&mut self, event: Flags) {
+        match &mut self.held {
+            Some(held) if !self.broken => held.flags = held.flags.and(event),
+            _ => self.pending = self.pending.and(event),
+        }
     }
 
     pub(super) fn annotate(&mut self, line: u32, annotation: &Annotation) {
@@ -130,7 +155,7 @@ impl Encoder {
             if filament != 0.0 {
                 self.end_wall();
                 let flag = if filament < 0.0 { Flags::RETRACT } else { Flags::UNRETRACT };
-                self.start_from(from, out);
+                self.start_from(from, mv.line.0, out);
                 if let Some(held) = &mut self.held {
                     held.flags = held.flags.and(flag);
                 }
@@ -139,7 +164,7 @@ impl Encoder {
         }
         let extrudes = filament > 0.0;
         self.follow_wall(extrudes, from);
-        self.start_from(from, out);
+        self.start_from(from, mv.line.0, out);
         let layer = self.layers.segment(self.count, mv.line.0, extrudes, to[2]);
         let mut flags = Flags::default();
         if !extrudes {
@@ -156,14 +181,15 @@ impl Encoder {
             flags,
             layer,
             tool: self.tool,
+            object: self.objects.current,
             ..Vertex::default()
         };
-        self.hold(vertex, to, out);
-        self.mark(mv.line.0);
+        self.hold(vertex, to, mv.line.0, out);
         if !extrudes {
             return Segment::Travel;
         }
         self.filament_mm[usize::from(self.feature).min(FEATURES - 1)] += filament;
+        self.objects.lay(filament);
         Segment::Extrusion(self.feature)
     }
 
@@ -179,23 +205,24 @@ impl Encoder {
     }
 
     /// Makes sure that the held vertex is where the next segment starts.
-    fn start_from(&mut self, from: [f64; 3], out: &mut Vec<u32>) {
+    fn start_from(&mut self, from: [f64; 3], line: u32, out: &mut Vec<u32>) {
         let is_there = self.held.is_some() && !self.broken && distance(self.at_mm, from) < SAME_PLACE_MM;
         if !is_there {
             let layer = self.layers.number();
             let vertex = Vertex {
-                flags: Flags::BREAK.and(Flags::TRAVEL),
+                flags: Flags::BREAK.and(Flags::TRAVEL).and(core::mem::take(&mut self.pending)),
                 feature: self.feature,
                 layer,
                 tool: self.tool,
+                object: self.objects.current,
                 ..Vertex::default()
             };
-            self.hold(vertex, from, out);
+            self.hold(vertex, from, line, out);
             self.broken = false;
         }
     }
 
-    fn hold(&mut self, vertex: Vertex, place_mm: [f64; 3], out: &mut Vec<u32>) {
+    fn hold(&mut self, vertex: Vertex, place_mm: [f64; 3], line: u32, out: &mut Vec<u32>) {
         if self.count >= VERTICES_MAX {
             self.left_out += 1;
             return;
@@ -205,6 +232,7 @@ impl Encoder {
         self.clamped += u64::from(!inside);
         self.held = Some(Vertex { steps, ..vertex });
         self.at_mm = place_mm;
+        self.mark(line);
         self.count += 1;
     }
 
@@ -214,10 +242,14 @@ impl Encoder {
         }
     }
 
+    /// The next vertex comes from this line.
     fn mark(&mut self, line: u32) {
-        if self.count > self.next_mark {
-            self.marks.extend_from_slice(&[line, self.count - 1]);
-            self.next_mark = self.count - 1 + MARK_INTERVAL;
+        let step = line.saturating_sub(self.last_line).min(LINE_STEP_MAX);
+        self.line_steps.push(step as u8);
+        self.last_line = line;
+        if step == LINE_STEP_MAX || self.count >= self.next_mark {
+            self.marks.extend_from_slice(&[line, self.count]);
+            self.next_mark = self.count + MARK_INTERVAL;
         }
     }
 
@@ -246,6 +278,9 @@ impl Encoder {
     /// No more moves come.
     pub(super) fn finish(&mut self, out: &mut Vec<u32>) {
         self.end_wall();
+        if let Some(held) = &mut self.held {
+            held.flags = held.flags.and(core::mem::take(&mut self.pending));
+        }
         self.release(out);
     }
 }

@@ -7,19 +7,24 @@
 mod encoder;
 mod estimate;
 pub(crate) mod layers;
+mod objects;
+mod pictures;
+#[cfg(test)]
+mod story_tests;
 #[cfg(test)]
 mod tests;
 pub mod vertex;
 
 use std::collections::VecDeque;
 
-use gcode::{Action, Annotation, CHORD_TOLERANCE, Chords, LineNumber, Move};
+use gcode::{Action, Annotation, CHORD_TOLERANCE, Chords, LineNumber, Move, PauseReason};
 use units::{Mm, Seconds};
 
 use self::{
     encoder::Encoder,
     estimate::Estimate,
-    vertex::{FEATURES, Grid, WORDS},
+    pictures::Pictures,
+    vertex::{FEATURES, Flags, Grid, WORDS},
 };
 use crate::{
     check::{CheckReport, Checker},
@@ -28,6 +33,8 @@ use crate::{
 
 pub use encoder::VERTICES_MAX;
 pub use layers::LAYERS_MAX;
+pub use objects::{OBJECTS_MAX, ObjectReport};
+pub use pictures::{PictureFormat, THUMBNAIL_BYTES_MAX, THUMBNAIL_SIDE_MAX, THUMBNAILS_MAX, Thumbnail};
 
 /// The most bytes that wait to be read.
 pub const INPUT_BYTES_MAX: usize = 256 * 1024;
@@ -77,6 +84,8 @@ pub struct PreviewReport {
     pub layers: Vec<LayerReport>,
     /// The kinds of extrusion that occur.
     pub features: Vec<FeatureReport>,
+    /// The objects that the file names; the first has number 1 in the vertices.
+    pub objects: Vec<ObjectReport>,
     /// Print time of the whole; `None` without a machine, or where a move cannot be planned.
     pub print_time: Option<Seconds>,
     /// Of it, moving without extruding, and dwells.
@@ -103,6 +112,7 @@ pub struct Preview {
     finished: bool,
     slicer_time: Option<Seconds>,
     generator: Option<String>,
+    pictures: Pictures,
 }
 
 impl Preview {
@@ -117,8 +127,10 @@ impl Preview {
         });
         let extruder = config.and_then(|config| config.extruder.as_ref());
         let area = extruder.map_or(FILAMENT_AREA_MM2, crate::config::ExtruderConfig::filament_area_mm2);
+        let mut checker = Checker::new(config);
+        checker.show_pictures();
         Self {
-            checker: Checker::new(config),
+            checker,
             encoder: Encoder::new(Grid::around(machine), area),
             estimate: config.and_then(Estimate::new),
             input: Vec::new(),
@@ -130,6 +142,7 @@ impl Preview {
             finished: false,
             slicer_time: None,
             generator: None,
+            pictures: Pictures::default(),
         }
     }
 
@@ -207,6 +220,12 @@ impl Preview {
             Action::Arc(arc) => self.arc = Some(arc.chords(CHORD_TOLERANCE)),
             Action::Home { .. } => self.encoder.lose_way(),
             Action::SelectTool(tool) => self.encoder.select_tool(tool),
+            Action::Object(object) => self.encoder.objects.act(object),
+            Action::Pause(PauseReason::Requested) => self.encoder.event(Flags::PAUSE),
+            Action::Pause(PauseReason::FilamentChange) => {
+                self.encoder.event(Flags::PAUSE.and(Flags::FILAMENT_CHANGE));
+            }
+            Action::Annotation(Annotation::Picture(line)) => self.pictures.read(&line),
             Action::Annotation(Annotation::EstimatedTime(time)) => self.slicer_time = Some(time),
             Action::Annotation(Annotation::Generator(name)) => self.generator = Some(name),
             Action::Annotation(annotation) => self.encoder.annotate(line.0, &annotation),
@@ -228,6 +247,17 @@ impl Preview {
         core::mem::take(&mut self.encoder.marks)
     }
 
+    /// How many lines further than the vertex before it each vertex comes from, new since the last call; 255 where that is
+    /// more, which then has a mark.
+    pub fn take_line_steps(&mut self) -> Vec<u8> {
+        core::mem::take(&mut self.encoder.line_steps)
+    }
+
+    /// The file's pictures of the print, new since the last call: at most [`THUMBNAILS_MAX`] all together.
+    pub fn take_thumbnails(&mut self) -> Vec<Thumbnail> {
+        self.pictures.take()
+    }
+
     /// What the file holds. Works on what is left; its vertices go to nobody.
     pub fn finish(mut self) -> PreviewReport {
         self.end();
@@ -235,6 +265,7 @@ impl Preview {
         while self.run(&mut rest) {
             rest.clear();
             self.encoder.marks.clear();
+            self.encoder.line_steps.clear();
         }
         let print_time = self.estimate.as_mut().and_then(Estimate::finish);
         self.checker.add(self.estimate.as_mut().and_then(|estimate| estimate.too_fast.take()));
@@ -252,6 +283,7 @@ impl Preview {
             left_out: self.encoder.left_out,
             layers: layers.collect(),
             features,
+            objects: self.encoder.objects.into_list(),
             print_time,
             travel_time: Seconds(print_time.map_or(0.0, |time| (time.0 - in_features).max(0.0))),
             slicer_time: self.slicer_time,

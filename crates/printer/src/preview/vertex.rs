@@ -20,10 +20,12 @@ const SIZE_SHIFT: u32 = 20;
 const FEATURE_SHIFT: u32 = 20;
 const FEATURE_MASK: u32 = 31;
 const TOOL_SHIFT: u32 = 20;
+const OBJECT_SHIFT: u32 = 24;
+const EVENT_SHIFT: u32 = 29;
 /// How many features have a number.
 pub const FEATURES: usize = 17;
 
-/// What may be said of a vertex besides; bits of the third word.
+/// What may be said of a vertex besides: bits of the third word, and events, which lie in the upper end of the second.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Flags(u32);
 
@@ -40,7 +42,14 @@ impl Flags {
     pub const SEAM: Self = Self(1 << 29);
     /// A travel over what was just printed.
     pub const WIPE: Self = Self(1 << 30);
-    const ALL: u32 = 63 << 25;
+    /// The file waits for the user where the segment ends.
+    pub const PAUSE: Self = Self(1 << 31);
+    /// Another tool is taken there.
+    pub const TOOL_CHANGE: Self = Self(1);
+    /// The pause is for a change of filament.
+    pub const FILAMENT_CHANGE: Self = Self(1 << 1);
+    const OF_SEGMENT: u32 = 127 << 25;
+    const EVENTS: u32 = 3;
 
     /// Both.
     #[must_use]
@@ -94,6 +103,8 @@ pub struct Vertex {
     pub layer: u32,
     /// The extruder.
     pub tool: u32,
+    /// The object that it belongs to: 0 none, 255 one beyond those that are told apart.
+    pub object: u8,
 }
 
 /// A width in the vertex's units.
@@ -117,9 +128,11 @@ impl Vertex {
         let [x, y, z] = self.steps.map(|steps| steps.min(STEPS_MAX));
         [
             x | self.width.min(WIDTH_MAX) << SIZE_SHIFT,
-            y | self.height.min(HEIGHT_MAX) << SIZE_SHIFT,
-            z | (u32::from(self.feature) & FEATURE_MASK) << FEATURE_SHIFT | self.flags.0,
-            self.layer.min(LAYER_MAX) | self.tool.min(TOOL_MAX) << TOOL_SHIFT,
+            y | self.height.min(HEIGHT_MAX) << SIZE_SHIFT | (self.flags.0 & Flags::EVENTS) << EVENT_SHIFT,
+            z | (u32::from(self.feature) & FEATURE_MASK) << FEATURE_SHIFT | self.flags.0 & Flags::OF_SEGMENT,
+            self.layer.min(LAYER_MAX)
+                | self.tool.min(TOOL_MAX) << TOOL_SHIFT
+                | u32::from(self.object) << OBJECT_SHIFT,
         ]
     }
 
@@ -131,9 +144,10 @@ impl Vertex {
             width: a >> SIZE_SHIFT & WIDTH_MAX,
             height: b >> SIZE_SHIFT & HEIGHT_MAX,
             feature: (c >> FEATURE_SHIFT & FEATURE_MASK) as u8,
-            flags: Flags(c & Flags::ALL),
+            flags: Flags(c & Flags::OF_SEGMENT | b >> EVENT_SHIFT & Flags::EVENTS),
             layer: d & LAYER_MAX,
             tool: d >> TOOL_SHIFT & TOOL_MAX,
+            object: (d >> OBJECT_SHIFT) as u8,
         }
     }
 }
@@ -207,18 +221,33 @@ mod tests {
             flags: Flags::SEAM,
             layer: 7,
             tool: 1,
+            object: 0,
         };
         assert!(inside);
         assert_eq!(vertex.pack(), [0x06E0_5A00, 0x0320_C900, 0x2010_0133, 0x0010_0007]);
+        let events = Flags::TOOL_CHANGE.and(Flags::FILAMENT_CHANGE);
+        let vertex = Vertex { flags: vertex.flags.and(events), object: 3, ..vertex };
+        assert_eq!(vertex.pack(), [0x06E0_5A00, 0x6320_C900, 0x2010_0133, 0x0310_0007]);
     }
 
     #[test]
     fn every_flag_has_its_own_bit() {
-        let flags = [Flags::TRAVEL, Flags::BREAK, Flags::RETRACT, Flags::UNRETRACT, Flags::SEAM, Flags::WIPE];
+        let flags = [
+            Flags::TRAVEL,
+            Flags::BREAK,
+            Flags::RETRACT,
+            Flags::UNRETRACT,
+            Flags::SEAM,
+            Flags::WIPE,
+            Flags::PAUSE,
+        ];
         for (at, flag) in flags.iter().enumerate() {
             assert_eq!(flag.0, 1 << (25 + at));
         }
-        assert_eq!(flags.iter().fold(0, |all, flag| all | flag.0), Flags::ALL);
+        assert_eq!(flags.iter().fold(0, |all, flag| all | flag.0), Flags::OF_SEGMENT);
+        for (at, event) in [Flags::TOOL_CHANGE, Flags::FILAMENT_CHANGE].into_iter().enumerate() {
+            assert_eq!(Vertex { flags: event, ..Vertex::default() }.pack(), [0, 1 << (29 + at), 0, 0]);
+        }
     }
 
     #[test]

@@ -168,12 +168,17 @@ fn objects_of_both_dialects() {
         objects("M486 T2\nM486 S0 A\"cube.stl\"\nM486 S-1\nM486 P1\nM486 C"),
         [
             ObjectAction::Count(2),
-            define,
+            define.clone(),
             ObjectAction::Start(ObjectId::Index(0)),
             ObjectAction::End(None),
             ObjectAction::Cancel(Some(ObjectId::Index(1))),
             ObjectAction::Cancel(None),
         ]
+    );
+    // PrusaSlicer gives the label a line of its own.
+    assert_eq!(
+        objects("M486 S0\nM486 Acube.stl\nM486 S-1\nM486 Anobody"),
+        [ObjectAction::Start(ObjectId::Index(0)), define, ObjectAction::End(None)]
     );
     assert_eq!(read("EXCLUDE_OBJECT_START").said(), ["1:0-20 error missing-value"]);
     assert_eq!(read("M486 S1.5").said(), ["1:5-6 error value-out-of-range"]);
