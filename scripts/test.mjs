@@ -76,6 +76,14 @@ const steps = [
     name: 'TypeScript tests',
     commands: ['web', 'viz/toolpath'].map((folder) => packaged('vitest/vitest.mjs', 'run', '--root', folder)),
   },
+  {
+    name: 'pictures of the 3D view',
+    absent: browserAbsent,
+    commands: [
+      packaged('vite/bin/vite.js', 'build', join('viz', 'toolpath', 'harness')),
+      [process.execPath, join('viz', 'toolpath', 'harness', 'visual.mjs')],
+    ],
+  },
   // Before the page, which takes them along.
   { name: 'instruments build', commands: [['cargo', 'xtask', 'instruments']] },
   {

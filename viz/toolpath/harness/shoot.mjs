@@ -3,25 +3,10 @@
 // The browser is that of the browser tests. Software GL, so that every machine gives the same pictures.
 import { mkdirSync } from 'node:fs';
 import { join } from 'node:path';
-import { fileURLToPath } from 'node:url';
-import { chromium } from 'playwright-core';
-import { BROWSER_ADVICE, browserArguments, findBrowser } from '../../../scripts/lib/browser.mjs';
-import { fileServer, listen } from '../../../scripts/lib/server.mjs';
+import { DIST, drawnAtRest, frameCount, withBrowser } from './browser.mjs';
 
-const dist = fileURLToPath(new URL('./dist', import.meta.url));
-const out = process.argv[2] ?? join(dist, 'pictures');
+const out = process.argv[2] ?? join(DIST, 'pictures');
 const only = process.argv[3];
-const SOFTWARE_GL = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
-
-const drawnAtRest = (page, since) =>
-  page.waitForFunction(
-    (n) => window.harness.ready && window.harness.frames.slice(n).some((f) => f.kind === 'full'),
-    since,
-    {
-      timeout: 120_000,
-    },
-  );
-const frameCount = (page) => page.evaluate(() => window.harness.frames.length);
 
 async function open(browser, url, query, size = { width: 1200, height: 800 }) {
   const page = await browser.newPage({ viewport: size });
@@ -120,19 +105,8 @@ async function measure(browser, url) {
 }
 
 mkdirSync(out, { recursive: true });
-const executablePath = findBrowser();
-if (!executablePath) throw new Error(`Missing: ${BROWSER_ADVICE}`);
-const server = fileServer(dist);
-const url = await listen(server);
-const browser = await chromium.launch({
-  executablePath,
-  args: [...new Set([...browserArguments(), ...SOFTWARE_GL])],
-});
-try {
+await withBrowser(async (browser, url) => {
   if (!only || only === 'pictures') await pictures(browser, url);
   if (!only || only === 'robustness') await robustness(browser, url);
   if (!only || only === 'measure') await measure(browser, url);
-} finally {
-  await browser.close();
-  server.close();
-}
+});

@@ -3,58 +3,7 @@
  *
  * Units: mm. The same arguments give the same vertices.
  */
-import type { Layer } from '../src/layers';
-import { encodeVertex, type FeatureName, FLAGS, type VertexHeader, WORDS_PER_VERTEX } from '../src/vertex';
-
-export const HEADER: VertexHeader = { originMm: [-20, -20, -1], stepMm: 2 ** -10 };
-const LAYER_MM = 0.2;
-const WIDTH_MM = 0.45;
-
-export interface Synthetic {
-  readonly vertices: Uint32Array<ArrayBuffer>;
-  readonly layers: Layer[];
-}
-
-class Writer {
-  words = new Uint32Array(1 << 16);
-  count = 0;
-  z = LAYER_MM;
-  layer = 0;
-  #at: readonly [number, number] = [0, 0];
-
-  to(x: number, y: number, feature: FeatureName, flags = 0, widthMm = WIDTH_MM): void {
-    if ((this.count + 1) * WORDS_PER_VERTEX > this.words.length) {
-      const grown = new Uint32Array(this.words.length * 2);
-      grown.set(this.words);
-      this.words = grown;
-    }
-    const start = this.count === 0 ? FLAGS.break : 0;
-    encodeVertex(HEADER, this.words, this.count, {
-      positionMm: [x, y, this.z],
-      widthMm,
-      heightMm: LAYER_MM,
-      feature,
-      layer: this.layer,
-      flags: flags | start,
-    });
-    this.count += 1;
-    this.#at = [x, y];
-  }
-
-  travel(x: number, y: number, feature: FeatureName): void {
-    this.to(...this.#at, feature, FLAGS.retract | FLAGS.travel);
-    this.to(x, y, feature, FLAGS.travel);
-    this.to(x, y, feature, FLAGS.travel | FLAGS.unretract);
-  }
-
-  loop(points: readonly (readonly [number, number])[], feature: FeatureName): void {
-    const first = points[0];
-    if (!first) return;
-    this.travel(...first, feature);
-    for (const [x, y] of points.slice(1)) this.to(x, y, feature);
-    this.to(...first, feature, feature === 'outerWall' ? FLAGS.seam : 0);
-  }
-}
+import { type Made, type Point, square, Writer } from './writer';
 
 function vase(cx: number, cy: number, radius: number, z: number, sides: number): [number, number][] {
   const points: [number, number][] = [];
@@ -66,57 +15,49 @@ function vase(cx: number, cy: number, radius: number, z: number, sides: number):
   return points;
 }
 
-const square = (x0: number, y0: number, x1: number, y1: number): [number, number][] => [
-  [x0, y0],
-  [x1, y0],
-  [x1, y1],
-  [x0, y1],
-];
-
-function zigzag(
-  out: Writer,
-  x0: number,
-  y0: number,
-  x1: number,
-  y1: number,
-  step: number,
-  feature: FeatureName,
-): void {
-  out.travel(x0, y0, feature);
+function zigzag(out: Writer, x0: number, y0: number, x1: number, y1: number, step: number): void {
+  out.travel(x0, y0);
   let up = true;
   for (let x = x0; x <= x1; x += step) {
-    out.to(x, up ? y0 : y1, feature);
-    out.to(x, up ? y1 : y0, feature);
+    out.to(x, up ? y0 : y1);
+    out.to(x, up ? y1 : y0);
     up = !up;
   }
 }
 
-/** Three walls, the outer one last. */
-function walls(out: Writer, loop: (insetMm: number) => [number, number][]): void {
-  for (let wall = 2; wall >= 0; wall--) out.loop(loop(wall * 0.42), wall === 0 ? 'outerWall' : 'innerWall');
+/** Three walls, the outer one last and slower. */
+function walls(out: Writer, loop: (insetMm: number) => Point[]): void {
+  for (let wall = 2; wall >= 0; wall--) {
+    out.manner.feature = wall === 0 ? 'outerWall' : 'innerWall';
+    out.manner.feedMmS = wall === 0 ? 40 : 80;
+    out.loop(loop(wall * 0.42));
+  }
 }
 
 function box(out: Writer, layer: number, layers: number): void {
   walls(out, (inset) => square(110 + inset, 50 + inset, 150 - inset, 100 - inset));
   const solid = layer < 3 || layer >= layers - 3;
-  const feature = layer === layers - 1 ? 'topSurface' : solid ? 'solidInfill' : 'infill';
-  zigzag(out, 111.4, 51.4, 148.6, 98.6, solid ? 0.42 : 2.4, feature);
+  out.manner.feature = layer === layers - 1 ? 'topSurface' : solid ? 'solidInfill' : 'infill';
+  out.manner.feedMmS = solid ? 100 : 150;
+  zigzag(out, 111.4, 51.4, 148.6, 98.6, solid ? 0.42 : 2.4);
 }
 
 /** About so many segments. */
-export function synthetic(segments: number): Synthetic {
+export function synthetic(segments: number): Made {
   const out = new Writer();
-  const layers: Layer[] = [];
   const count = Math.round(Math.min(Math.max(Math.sqrt(segments) / 2.2, 40), 300));
   const sides = Math.max(Math.round((segments / count - 260) / 3), 24);
   const boxLayers = Math.min(count, 60);
-  out.loop(square(20, 20, 160, 130), 'skirt');
+  out.manner.feature = 'skirt';
   for (let layer = 0; layer < count; layer++) {
-    layers.push({ firstVertex: layer === 0 ? 0 : out.count, zMm: out.z });
-    out.layer = layer;
+    out.layer(30 - 20 * (layer / count));
+    if (layer === 0) out.loop(square(20, 20, 160, 130));
+    out.manner.reached = 0.6 + 0.4 * Math.abs(Math.sin(layer / 7));
+    out.manner.fan = Math.min(layer * 20, 100);
+    out.manner.object = 1;
     walls(out, (inset) => vase(60, 75, 28 - inset, out.z, sides));
+    out.manner.object = 2;
     if (layer < boxLayers) box(out, layer, boxLayers);
-    out.z += LAYER_MM;
   }
-  return { vertices: out.words.slice(0, out.count * WORDS_PER_VERTEX), layers };
+  return out.made();
 }

@@ -50,6 +50,8 @@ const DISTANCE_MIN_MM = 1;
 const DISTANCE_MAX_MM = 20_000;
 /** Room left around a fitted box. */
 const FIT_MARGIN = 1.08;
+/** Beads and markers are wider than the places in the box. */
+const ROUND_ABOUT_MM: Mm = 2;
 /** How far the near plane may lie before the far one: what 24 bits of depth keep apart. */
 const DEPTH_RATIO_MAX = 4000;
 
@@ -189,9 +191,9 @@ export function clipPlanes(camera: CameraState, box: BoxMm): { readonly nearMm: 
   const depths = corners(box).map((corner) => dot(along(corner, [-1, eyeMm]), forward));
   if (camera.projection === 'orthographic') {
     // Depth is linear here: a plane behind the eye is as good as one before it.
-    return { nearMm: Math.min(...depths) - 1, farMm: Math.max(...depths) + 1 };
+    return { nearMm: Math.min(...depths) - ROUND_ABOUT_MM, farMm: Math.max(...depths) + ROUND_ABOUT_MM };
   }
-  const farMm = Math.max(Math.max(...depths) * 1.01, 1);
-  const nearMm = Math.max(Math.min(...depths) * 0.99, farMm / DEPTH_RATIO_MAX);
+  const farMm = Math.max(Math.max(...depths) * 1.01 + ROUND_ABOUT_MM, 1);
+  const nearMm = Math.max(Math.min(...depths) * 0.99 - ROUND_ABOUT_MM, farMm / DEPTH_RATIO_MAX);
   return { nearMm, farMm };
 }

@@ -1,12 +1,12 @@
 /**
- * The vertices of a file, in pieces that each fit one texture, and the boxes around them.
+ * The vertices of a file, and what the planner says of them, in pieces that each fit one texture; the boxes around them.
  *
- * Does: takes vertices as they come and keeps them in rows of texels; splits a range of vertices among the pieces. Each
- * piece repeats the two vertices before it and the one after, because a bead's ends need its neighbours.
+ * Does: takes texels as they come and keeps them in rows; splits a range of vertices among the pieces. Each piece repeats the two vertices before it and the one after, because a bead's ends need its neighbours.
  * Does not know: textures, drawing. Units: vertex indices; mm in the boxes.
  */
 import type { BoxMm } from './camera';
 import type { VertexRange } from './layers';
+import type { VertexIndex } from './units';
 import { FLAGS, featureNumber, type VertexHeader, WORDS_PER_VERTEX } from './vertex';
 
 /** Texels in a row: what every WebGL2 offers. */
@@ -72,49 +72,43 @@ class StepBox {
   }
 }
 
-export class VertexStore {
-  readonly header: VertexHeader;
+/** Four words a vertex, in order, in chunks. */
+export class TexelStore {
   readonly chunks: Chunk[] = [];
+  readonly #blank: number;
   #count = 0;
-  readonly #partBox = new StepBox();
-  readonly #laidBox = new StepBox();
 
-  constructor(header: VertexHeader) {
-    this.header = header;
+  /** `blank`: the third word of a texel without a vertex; the others are 0. */
+  constructor(blank: number) {
+    this.#blank = blank;
   }
 
   get count(): number {
     return this.#count;
   }
 
-  /** The box of all that is laid down; of the part alone if there is one. */
-  box(): BoxMm | null {
-    return this.#partBox.inMm(this.header) ?? this.#laidBox.inMm(this.header);
-  }
-
-  /** The box of everything laid down, skirt and prime line too. */
-  boxOfAll(): BoxMm | null {
-    return this.#laidBox.inMm(this.header);
-  }
-
-  /** Adds vertices; `words` holds four words for each, a rest of less than a vertex is left out. */
+  /** Adds texels; a rest of less than one is left out. */
   append(words: Uint32Array): void {
     const total = Math.floor(words.length / WORDS_PER_VERTEX);
-    this.#measure(words, total);
     let taken = 0;
     while (taken < total) {
       const chunk = this.#open();
       const free = VERTICES_PER_CHUNK - chunk.count;
       const count = Math.min(free, total - taken);
       const part = words.subarray(taken * WORDS_PER_VERTEX, (taken + count) * WORDS_PER_VERTEX);
-      write(chunk, chunk.count, part);
+      write(chunk, chunk.count, part, this.#blank);
       const before = this.chunks.at(-2);
       if (before && chunk.count === 0)
-        write(before, before.count, part.subarray(0, TRAIL_TEXELS * WORDS_PER_VERTEX));
+        write(before, before.count, part.subarray(0, TRAIL_TEXELS * WORDS_PER_VERTEX), this.#blank);
       chunk.count += count;
       taken += count;
       this.#count += count;
     }
+  }
+
+  /** The chunk that a vertex is its own in, if it is there. */
+  chunkOf(vertex: VertexIndex): Chunk | undefined {
+    return this.chunks[Math.floor(vertex / VERTICES_PER_CHUNK)];
   }
 
   /** Where a range of vertices lies. */
@@ -147,19 +141,54 @@ export class VertexStore {
       chunk.data.set(last.data.subarray(from, from + LEAD_TEXELS * WORDS_PER_VERTEX));
     } else {
       for (let texel = 0; texel < LEAD_TEXELS; texel++)
-        chunk.data[texel * WORDS_PER_VERTEX + 2] = FLAGS.break;
+        chunk.data[texel * WORDS_PER_VERTEX + 2] = this.#blank;
     }
     this.chunks.push(chunk);
     return chunk;
+  }
+}
+
+/** The vertices of a file. */
+export class VertexStore extends TexelStore {
+  readonly header: VertexHeader;
+  readonly #partBox = new StepBox();
+  readonly #laidBox = new StepBox();
+  readonly #wholeBox = new StepBox();
+
+  constructor(header: VertexHeader) {
+    // What is no vertex must not look like a neighbour.
+    super(FLAGS.break);
+    this.header = header;
+  }
+
+  /** The box of all that is laid down; of the part alone if there is one. */
+  box(): BoxMm | null {
+    return this.#partBox.inMm(this.header) ?? this.#laidBox.inMm(this.header);
+  }
+
+  /** The box of everything laid down, skirt and prime line too. */
+  boxOfAll(): BoxMm | null {
+    return this.#laidBox.inMm(this.header);
+  }
+
+  /** The box of all places, travels too. */
+  boxOfPlaces(): BoxMm | null {
+    return this.#wholeBox.inMm(this.header);
+  }
+
+  override append(words: Uint32Array): void {
+    this.#measure(words, Math.floor(words.length / WORDS_PER_VERTEX));
+    super.append(words);
   }
 
   #measure(words: Uint32Array, total: number): void {
     for (let at = 0; at < total * WORDS_PER_VERTEX; at += WORDS_PER_VERTEX) {
       const kind = words[at + 2] ?? 0;
-      if (kind & NOT_LAID) continue;
       const x = (words[at] ?? 0) & POSITION_MASK;
       const y = (words[at + 1] ?? 0) & POSITION_MASK;
       const z = kind & POSITION_MASK;
+      this.#wholeBox.add(x, y, z);
+      if (kind & NOT_LAID) continue;
       this.#laidBox.add(x, y, z);
       if (((BESIDE_THE_PART >>> ((kind >>> 20) & 31)) & 1) === 0) this.#partBox.add(x, y, z);
     }
@@ -167,7 +196,7 @@ export class VertexStore {
 }
 
 /** Puts vertices behind the `at` that the chunk has of its own, and grows it by doubling its rows. */
-function write(chunk: Chunk, at: number, words: Uint32Array): void {
+function write(chunk: Chunk, at: number, words: Uint32Array, blank: number): void {
   const texels = LEAD_TEXELS + at + words.length / WORDS_PER_VERTEX + TRAIL_TEXELS;
   const needed = Math.min(Math.ceil(texels / TEXELS_PER_ROW), ROWS_PER_CHUNK);
   if (needed > chunk.rows) {
@@ -177,8 +206,8 @@ function write(chunk: Chunk, at: number, words: Uint32Array): void {
     chunk.data = grown;
   }
   chunk.data.set(words, (LEAD_TEXELS + at) * WORDS_PER_VERTEX);
-  // The texel behind the last vertex must not look like a neighbour until one comes.
+  // The texel behind the last one, until that one comes.
   const behind = (LEAD_TEXELS + at) * WORDS_PER_VERTEX + words.length;
-  if (behind < chunk.data.length) chunk.data[behind + 2] = FLAGS.break;
+  if (behind < chunk.data.length) chunk.data[behind + 2] = blank;
   chunk.version += 1;
 }

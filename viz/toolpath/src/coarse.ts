@@ -6,7 +6,8 @@
  * wedge of directions from the run's first vertex (Williams 1978, Sklansky and Gonzalez 1980), so each vertex is
  * looked at once. Does not know: drawing. Units: steps of the header; the tolerance in mm.
  */
-import { VertexStore } from './chunks';
+import { ChannelSum } from './channels';
+import { LEAD_TEXELS, TexelStore, VertexStore } from './chunks';
 import { LayerList, type ReducedDetail, type VertexRange } from './layers';
 import type { Mm, VertexIndex } from './units';
 import { FLAGS, type VertexHeader, WORDS_PER_VERTEX } from './vertex';
@@ -57,6 +58,11 @@ export class Coarsener {
       else high = middle;
     }
     return low;
+  }
+
+  /** The file's index of a kept vertex; null for one that is not known yet. */
+  fileIndex(kept: number): VertexIndex | null {
+    return kept < this.#count ? (this.#kept[kept] ?? null) : null;
   }
 
   /** The kept ones of these vertices and of the one held back before; the last one is held back. */
@@ -151,7 +157,13 @@ function wrapped(angle: number): number {
 /** The coarse path of a file, beside the full one. */
 export class Rough {
   readonly store: VertexStore;
+  /** Of the kept vertices. */
+  readonly channels = new TexelStore(0);
   readonly #coarsener: Coarsener;
+  readonly #sum = new ChannelSum();
+  readonly #taken = new Uint32Array(WORDS_PER_VERTEX);
+  /** The file's vertex whose channels are taken next. */
+  #nextChannels = 0;
   #layers = new LayerList();
   /** What `#layers` was made from. */
   #from: { readonly layers: LayerList; readonly count: number } | null = null;
@@ -167,6 +179,26 @@ export class Rough {
 
   end(): void {
     this.store.append(this.#coarsener.finish());
+  }
+
+  /** Takes the channels of all vertices of which it is known whether they are kept; each is looked at once. */
+  takeChannels(channels: TexelStore): void {
+    let kept = this.channels.count;
+    const last = this.#coarsener.fileIndex(this.#coarsener.count - 1);
+    if (last === null) return;
+    const parts = channels.split({ first: this.#nextChannels, end: last + 1 });
+    for (const { chunk, first, count } of parts) {
+      const out: number[] = [];
+      for (let at = first; at < first + count; at++) {
+        this.#sum.add(chunk.data, (LEAD_TEXELS + at) * WORDS_PER_VERTEX);
+        if (this.#coarsener.fileIndex(kept) !== chunk.firstVertex + at) continue;
+        this.#sum.take(this.#taken, 0);
+        out.push(...this.#taken);
+        kept += 1;
+      }
+      this.channels.append(Uint32Array.from(out));
+      this.#nextChannels = chunk.firstVertex + first + count;
+    }
   }
 
   coarseOf(vertex: VertexIndex): number {

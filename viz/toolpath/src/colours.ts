@@ -6,7 +6,7 @@
  * Sources: the ramp runs through the colours of viridis (S. van der Walt, N. Smith, E. Firing; public domain, CC0); the
  * colours that tell apart are those of M. Okabe and K. Ito, "Color Universal Design" (2008).
  */
-import { type HexColour, rgb } from './palette';
+import { type HexColour, type Rgb, rgb, type Theme } from './palette';
 
 /** The index is the mode's number in the shader. */
 export const COLOUR_MODES = [
@@ -54,7 +54,7 @@ export const PLANNED_MODES: readonly ColourMode[] = [
 ];
 
 /** Evenly spaced from the least to the greatest value. Brightness rises all the way, so that it can be read without hue. */
-export const RAMP: readonly HexColour[] = [
+const VIRIDIS: readonly HexColour[] = [
   '#440154',
   '#482878',
   '#3e4989',
@@ -66,6 +66,35 @@ export const RAMP: readonly HexColour[] = [
   '#b5de2b',
   '#fde725',
 ];
+/** On a dark background the darkest part of the ramp could not be seen. */
+const DARK_START = 0.19;
+
+const hex = (part: number): string =>
+  Math.round(part * 255)
+    .toString(16)
+    .padStart(2, '0');
+
+/** The colour of a ramp at 0 … 1, between its colours in a straight line. */
+export function rampAt(ramp: readonly HexColour[], at: number): Rgb {
+  const place = Math.min(Math.max(at, 0), 1) * (ramp.length - 1);
+  const below = Math.min(Math.floor(place), ramp.length - 2);
+  const [a, b] = [rgb(ramp[below] ?? '#000000'), rgb(ramp[below + 1] ?? '#000000')];
+  const mixed = (channel: 0 | 1 | 2): number => a[channel] + (place - below) * (b[channel] - a[channel]);
+  return [mixed(0), mixed(1), mixed(2)];
+}
+
+/** The colours of measured values, evenly spaced from the least to the greatest. */
+export const RAMPS: Readonly<Record<Theme, readonly HexColour[]>> = {
+  light: VIRIDIS,
+  dark: VIRIDIS.map((_, at): HexColour => {
+    const colour = rampAt(VIRIDIS, DARK_START + ((1 - DARK_START) * at) / (VIRIDIS.length - 1));
+    return `#${colour.map(hex).join('')}`;
+  }),
+};
+/** The ramp on a light background. */
+export const RAMP = VIRIDIS;
+/** How many colours a ramp has. */
+export const RAMP_LENGTH = VIRIDIS.length;
 
 /** For tools and objects, over and over. */
 export const CATEGORIES: readonly HexColour[] = [

@@ -1,7 +1,7 @@
 /** The package's face: what a page may use. The view itself (three.js) is reached through the host, or `./view`. */
 export type { Bed } from './bed';
 export type { BoxMm, CameraPreset, CameraState, Projection } from './camera';
-export { type Channels, decodeChannels } from './channels';
+export { type Channels, decodeChannels, WORDS_PER_CHANNELS } from './channels';
 export {
   CATEGORICAL_MODES,
   COLOUR_MODES,
@@ -10,6 +10,7 @@ export {
   categoryColour,
   PLANNED_MODES,
   RAMP,
+  RAMPS,
   type ValueRange,
 } from './colours';
 export { attachControls } from './controls';
@@ -20,7 +21,7 @@ export type { Slice, SourcedRequest, ViewEvent, ViewRequest } from './messages';
 export { type HexColour, PALETTES, type Palette, type Theme } from './palette';
 export type { Shown } from './shown';
 export { SLICE_MAX } from './slice';
-export type { BedMesh } from './surface';
+export { type BedMesh, exaggerationOf, heightRange } from './surface';
 export type { CssPx, LayerIndex, Mm, Ms, Radians, VertexIndex } from './units';
 export {
   decodeVertex,

@@ -20,6 +20,22 @@ export interface VertexRange {
   readonly end: VertexIndex;
 }
 
+export const lengthOf = (ranges: readonly VertexRange[]): number =>
+  ranges.reduce((sum, { first, end }) => sum + end - first, 0);
+
+/** Of ranges put end to end, what lies `at … at + count − 1` from the beginning. */
+export function cut(ranges: readonly VertexRange[], at: number, count: number): VertexRange[] {
+  const parts: VertexRange[] = [];
+  let before = 0;
+  for (const { first, end } of ranges) {
+    const from = Math.max(first, first + at - before);
+    const to = Math.min(end, first + at + count - before);
+    if (to > from) parts.push({ first: from, end: to });
+    before += end - first;
+  }
+  return parts;
+}
+
 /** What to draw when there is too much. */
 export interface ReducedDetail {
   readonly ranges: readonly VertexRange[];
@@ -48,7 +64,7 @@ export class LayerList {
 
   /** The same layers in another numbering of the vertices. */
   mapped(to: (vertex: VertexIndex) => VertexIndex): LayerList {
-    return new LayerList(this.#layers.map(({ firstVertex, zMm }) => ({ firstVertex: to(firstVertex), zMm })));
+    return new LayerList(this.#layers.map((layer) => ({ ...layer, firstVertex: to(layer.firstVertex) })));
   }
 
   get count(): number {

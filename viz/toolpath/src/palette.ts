@@ -12,6 +12,7 @@ export type HexColour = `#${string}`;
 export type Rgb = readonly [number, number, number];
 
 export interface Palette {
+  readonly theme: Theme;
   readonly background: HexColour;
   readonly bed: HexColour;
   readonly gridFine: HexColour;
@@ -24,9 +25,17 @@ export interface Palette {
   readonly retract: HexColour;
   readonly unretract: HexColour;
   readonly seam: HexColour;
+  readonly toolChange: HexColour;
+  readonly pause: HexColour;
   readonly nozzle: HexColour;
   /** What is still to be printed is drawn near this colour. */
   readonly remaining: HexColour;
+  /** Where a colour's value is not known. */
+  readonly neutral: HexColour;
+  /** What leaves the machine's volume. */
+  readonly warning: HexColour;
+  /** The segment that is pointed at. */
+  readonly highlight: HexColour;
   readonly features: Readonly<Record<FeatureName, HexColour>>;
 }
 
@@ -52,6 +61,7 @@ const FEATURE_COLOURS: Readonly<Record<FeatureName, HexColour>> = {
 
 export const PALETTES: Readonly<Record<Theme, Palette>> = {
   light: {
+    theme: 'light',
     background: '#eef1f4',
     bed: '#dfe4e9',
     gridFine: '#ced5dc',
@@ -64,11 +74,17 @@ export const PALETTES: Readonly<Record<Theme, Palette>> = {
     retract: '#b0206f',
     unretract: '#1f7a4d',
     seam: '#1c2430',
+    toolChange: '#0072b2',
+    pause: '#c0392b',
     nozzle: '#1c2430',
     remaining: '#cdd3d9',
+    neutral: '#b4bcc4',
+    warning: '#e6007e',
+    highlight: '#0b57d0',
     features: FEATURE_COLOURS,
   },
   dark: {
+    theme: 'dark',
     background: '#15191e',
     bed: '#1d232a',
     gridFine: '#29313a',
@@ -81,8 +97,13 @@ export const PALETTES: Readonly<Record<Theme, Palette>> = {
     retract: '#e667ab',
     unretract: '#5fd097',
     seam: '#f2f5f8',
+    toolChange: '#56b4e9',
+    pause: '#ff7a6b',
     nozzle: '#f2f5f8',
     remaining: '#39434d',
+    neutral: '#5d6873',
+    warning: '#ff2f9e',
+    highlight: '#8ab4ff',
     features: FEATURE_COLOURS,
   },
 };

@@ -10,7 +10,6 @@ import {
   DataTexture,
   DoubleSide,
   GLSL3,
-  type IUniform,
   LineSegments,
   Mesh,
   NearestFilter,
@@ -22,19 +21,17 @@ import {
   UnsignedIntType,
 } from 'three';
 import { type Chunk, type ChunkRange, TEXELS_PER_ROW, VERTICES_PER_CHUNK } from './chunks';
-import { featureTable, type Palette, rgb } from './palette';
+import { PathUniforms, type Uniforms } from './path_uniforms';
 import {
   BEAD_FRAGMENT,
   BEAD_VERTEX,
   FLAT_FRAGMENT,
+  MARKER_FRAGMENT,
   MARKER_VERTEX,
   POINTS_PER_BEAD,
   TRAVEL_VERTEX,
 } from './shaders';
-import type { VertexHeader } from './vertex';
-
-/** A vertex that no file reaches: everything is printed. */
-export const ALL_PRINTED = 0xffff_ffff;
+import { WORDS_PER_VERTEX } from './vertex';
 
 /** Two strips of the facing half: left outline to nearest point, nearest point to right outline. */
 const BODY = [0, 5, 1, 1, 5, 6, 1, 6, 2, 2, 6, 7];
@@ -51,14 +48,18 @@ export interface PathPart {
   readonly stride: number;
 }
 
-type Uniforms = Record<string, IUniform>;
-
-/** Three.js objects of one chunk. */
-interface Drawn {
+/** A chunk on the GPU. */
+interface Copy {
   readonly chunk: Chunk;
   texture: DataTexture;
   version: number;
-  readonly sampler: IUniform<DataTexture>;
+}
+
+/** Three.js objects of one chunk. */
+interface Drawn {
+  vertices: Copy | null;
+  channels: Copy | null;
+  readonly uniforms: Uniforms;
   readonly beads: Mesh<BufferGeometry, RawShaderMaterial[]>;
   readonly travels: LineSegments<BufferGeometry, RawShaderMaterial>;
   readonly markers: Points<BufferGeometry, RawShaderMaterial>;
@@ -74,8 +75,8 @@ function beadIndex(pattern: readonly number[]): BufferAttribute {
   return new BufferAttribute(index, 1);
 }
 
-function textureOf(chunk: Chunk): DataTexture {
-  const texture = new DataTexture(chunk.data, TEXELS_PER_ROW, chunk.rows, RGBAIntegerFormat, UnsignedIntType);
+function texelsOf(data: Uint32Array<ArrayBuffer>, width: number, rows: number): DataTexture {
+  const texture = new DataTexture(data, width, rows, RGBAIntegerFormat, UnsignedIntType);
   texture.internalFormat = 'RGBA32UI';
   texture.minFilter = NearestFilter;
   texture.magFilter = NearestFilter;
@@ -84,31 +85,23 @@ function textureOf(chunk: Chunk): DataTexture {
   return texture;
 }
 
+const copyOf = (chunk: Chunk): Copy => ({
+  chunk,
+  texture: texelsOf(chunk.data, TEXELS_PER_ROW, chunk.rows),
+  version: chunk.version,
+});
+
+/** Where a chunk has no channels yet. */
+const NOTHING = texelsOf(new Uint32Array(WORDS_PER_VERTEX), 1, 1);
+
 export class PathObjects {
   readonly scene = new Scene();
+  readonly uniforms = new PathUniforms();
   readonly #pattern: readonly number[];
   readonly #defines: Record<string, number>;
   readonly #drawn: Drawn[] = [];
-  readonly #shared: Uniforms = {
-    uOrigin: { value: [0, 0, 0] },
-    uStep: { value: 2 ** -10 },
-    uPrinted: { value: ALL_PRINTED },
-    uFeatures: { value: ALL_PRINTED },
-    uStride: { value: 1 },
-    uHeightScale: { value: 1 },
-    uBedZ: { value: 0 },
-    uPixelAngle: { value: 0 },
-    uDefaultSize: { value: [0.45, 0.2] },
-    uPalette: { value: new Float32Array(0) },
-    uMarkers: { value: 0 },
-    uMarkerPx: { value: 6 },
-    ...Object.fromEntries(
-      ['uRemaining', 'uTravel', 'uWipe', 'uRetract', 'uUnretract', 'uSeam'].map((name) => [
-        name,
-        { value: [0, 0, 0] },
-      ]),
-    ),
-  };
+  /** Objects without a chunk: as long as there are any, the shaders stay compiled. */
+  #spare: Drawn | null = null;
   #index: BufferAttribute | null = null;
 
   constructor(shape: BeadShape) {
@@ -117,52 +110,22 @@ export class PathObjects {
     this.scene.matrixWorldAutoUpdate = false;
   }
 
-  set header(header: VertexHeader) {
-    this.#set('uOrigin', [...header.originMm]);
-    this.#set('uStep', header.stepMm);
-  }
-
-  set palette(palette: Palette) {
-    this.#set('uPalette', featureTable(palette));
-    this.#set('uRemaining', rgb(palette.remaining));
-    this.#set('uTravel', rgb(palette.travel));
-    this.#set('uWipe', rgb(palette.wipe));
-    this.#set('uRetract', rgb(palette.retract));
-    this.#set('uUnretract', rgb(palette.unretract));
-    this.#set('uSeam', rgb(palette.seam));
-  }
-
-  /** Bit `n`: beads of feature `n` are shown. */
-  set features(mask: number) {
-    this.#set('uFeatures', mask);
-  }
-
-  /** The flags whose vertices are marked. */
-  set markers(flags: number) {
-    this.#set('uMarkers', flags);
-  }
-
-  /** The first vertex that is not printed, or {@link ALL_PRINTED}. */
-  set printed(vertex: number) {
-    this.#set('uPrinted', vertex);
-  }
-
-  set heightScale(scale: number) {
-    this.#set('uHeightScale', scale);
-  }
-
-  /** Pixels of the drawing buffer: what one covers a millimetre away, and how many make a CSS pixel. */
-  setPixels(angle: number, ratio: number): void {
-    this.#set('uPixelAngle', angle);
-    this.#set('uMarkerPx', 6 * ratio);
-  }
-
-  /** Brings textures up to date with the store's chunks. */
-  sync(chunks: readonly Chunk[]): void {
-    for (const [at, chunk] of chunks.entries()) {
+  /** Brings textures up to date with the stores' chunks. */
+  sync(vertices: readonly Chunk[], channels: readonly Chunk[]): void {
+    for (const [at, chunk] of vertices.entries()) {
       const drawn = this.#drawn[at];
-      if (!drawn) this.#drawn.push(this.#create(chunk));
-      else if (drawn.version !== chunk.version) refresh(drawn);
+      if (!drawn) this.#drawn.push(this.#objectsOf(chunk));
+      else if (drawn.vertices && refresh(drawn.vertices)) {
+        put(drawn.uniforms, 'uVertices', drawn.vertices.texture);
+      }
+    }
+    for (const [at, chunk] of channels.entries()) {
+      const drawn = this.#drawn[at];
+      if (!drawn || drawn.channels?.version === chunk.version) continue;
+      if (drawn.channels) refresh(drawn.channels);
+      else drawn.channels = copyOf(chunk);
+      put(drawn.uniforms, 'uChannels', drawn.channels.texture);
+      put(drawn.uniforms, 'uChannelCount', chunk.count);
     }
   }
 
@@ -178,7 +141,7 @@ export class PathObjects {
       drawn.beads.visible = true;
       drawn.beads.geometry.addGroup(first * perBead, (end - first) * perBead, 0);
     }
-    this.#set('uStride', parts[0]?.stride ?? 1);
+    this.uniforms.set('uStride', parts[0]?.stride ?? 1);
   }
 
   /** Travels and markers of these ranges are drawn next, and nothing else. */
@@ -197,15 +160,40 @@ export class PathObjects {
     }
   }
 
-  /** Takes all chunks away; shared parts stay. */
+  /** What is drawn next cannot be seen, but takes every shader. */
+  showNothing(): void {
+    if (this.#drawn.length > 0) return;
+    this.#spare ??= this.#create();
+    const { beads, travels, markers } = this.#spare;
+    beads.visible = true;
+    beads.geometry.addGroup(0, this.#pattern.length, 0);
+    travels.visible = true;
+    travels.geometry.setDrawRange(0, 2);
+    markers.visible = true;
+    markers.geometry.setDrawRange(0, 1);
+  }
+
+  /** Nothing is drawn next. */
+  hide(): void {
+    this.#hideAll();
+    if (this.#spare) hide(this.#spare);
+  }
+
+  /** Takes all chunks away; shared parts and compiled shaders stay. */
   clear(): void {
-    for (const drawn of this.#drawn) this.#release(drawn);
+    for (const drawn of this.#drawn) {
+      letGo(drawn);
+      if (this.#spare) this.#release(drawn);
+      else this.#spare = drawn;
+    }
     this.#drawn.length = 0;
   }
 
-  #set(name: string, value: unknown): void {
-    const uniform = this.#shared[name];
-    if (uniform) uniform.value = value;
+  /** Takes everything away that was on the GPU. */
+  release(): void {
+    this.clear();
+    if (this.#spare) this.#release(this.#spare);
+    this.#spare = null;
   }
 
   #of(chunk: Chunk): Drawn | undefined {
@@ -213,17 +201,27 @@ export class PathObjects {
   }
 
   #hideAll(): void {
-    for (const { beads, travels, markers } of this.#drawn) {
-      for (const object of [beads, travels, markers]) object.visible = false;
-      beads.geometry.clearGroups();
-    }
+    for (const drawn of this.#drawn) hide(drawn);
   }
 
-  #create(chunk: Chunk): Drawn {
+  #objectsOf(chunk: Chunk): Drawn {
+    const drawn = this.#spare ?? this.#create();
+    this.#spare = null;
+    drawn.vertices = copyOf(chunk);
+    put(drawn.uniforms, 'uVertices', drawn.vertices.texture);
+    put(drawn.uniforms, 'uBase', chunk.firstVertex);
+    return drawn;
+  }
+
+  #create(): Drawn {
     this.#index ??= beadIndex(this.#pattern);
-    const texture = textureOf(chunk);
-    const sampler = { value: texture };
-    const uniforms: Uniforms = { ...this.#shared, uVertices: sampler, uBase: { value: chunk.firstVertex } };
+    const uniforms: Uniforms = {
+      ...this.uniforms.all,
+      uVertices: { value: NOTHING },
+      uChannels: { value: NOTHING },
+      uChannelCount: { value: 0 },
+      uBase: { value: 0 },
+    };
     const material = (vertexShader: string, fragmentShader: string): RawShaderMaterial => {
       const made = new RawShaderMaterial({
         glslVersion: GLSL3,
@@ -238,13 +236,12 @@ export class PathObjects {
     };
     const geometry = new BufferGeometry().setIndex(this.#index);
     return {
-      chunk,
-      texture,
-      sampler,
-      version: chunk.version,
+      vertices: null,
+      channels: null,
+      uniforms,
       beads: this.#add(new Mesh(geometry, [material(BEAD_VERTEX, BEAD_FRAGMENT)])),
       travels: this.#add(new LineSegments(new BufferGeometry(), material(TRAVEL_VERTEX, FLAT_FRAGMENT))),
-      markers: this.#add(new Points(new BufferGeometry(), material(MARKER_VERTEX, FLAT_FRAGMENT))),
+      markers: this.#add(new Points(new BufferGeometry(), material(MARKER_VERTEX, MARKER_FRAGMENT))),
     };
   }
 
@@ -256,8 +253,7 @@ export class PathObjects {
     return object;
   }
 
-  #release({ texture, beads, travels, markers }: Drawn): void {
-    texture.dispose();
+  #release({ beads, travels, markers }: Drawn): void {
     this.scene.remove(beads, travels, markers);
     // The index is shared with the chunks to come.
     beads.geometry.setIndex(null).dispose();
@@ -269,14 +265,38 @@ export class PathObjects {
   }
 }
 
-function refresh(drawn: Drawn): void {
-  const { chunk, texture } = drawn;
+function hide({ beads, travels, markers }: Drawn): void {
+  for (const object of [beads, travels, markers]) object.visible = false;
+  beads.geometry.clearGroups();
+}
+
+/** A chunk's textures go, the objects stay. */
+function letGo(drawn: Drawn): void {
+  hide(drawn);
+  drawn.vertices?.texture.dispose();
+  drawn.channels?.texture.dispose();
+  drawn.vertices = null;
+  drawn.channels = null;
+  put(drawn.uniforms, 'uVertices', NOTHING);
+  put(drawn.uniforms, 'uChannels', NOTHING);
+  put(drawn.uniforms, 'uChannelCount', 0);
+}
+
+function put(uniforms: Uniforms, name: string, value: unknown): void {
+  const uniform = uniforms[name];
+  if (uniform) uniform.value = value;
+}
+
+/** Brings a copy up to date; true if it has another texture now. */
+function refresh(copy: Copy): boolean {
+  const { chunk, texture } = copy;
+  if (copy.version === chunk.version) return false;
+  copy.version = chunk.version;
   if (texture.image.data === chunk.data) {
     texture.needsUpdate = true;
-  } else {
-    texture.dispose();
-    drawn.texture = textureOf(chunk);
-    drawn.sampler.value = drawn.texture;
+    return false;
   }
-  drawn.version = chunk.version;
+  texture.dispose();
+  copy.texture = texelsOf(chunk.data, TEXELS_PER_ROW, chunk.rows);
+  return true;
 }

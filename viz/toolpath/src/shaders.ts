@@ -7,7 +7,8 @@
  * elsewhere the cap ends the bead. Units: mm; bits as in vertex.ts (docs/vertex.md).
  */
 import { LEAD_TEXELS, TEXELS_PER_ROW } from './chunks';
-import { FEATURE_COUNT_MAX, FIELDS, FLAGS, featureNumber, SIZE_STEP_MM } from './vertex';
+import { COLOUR } from './colour_shader';
+import { EVENTS, FIELDS, FLAGS, featureNumber, SIZE_STEP_MM } from './vertex';
 
 /** Points of one bead: five at each end. */
 export const POINTS_PER_BEAD = 10;
@@ -32,6 +33,10 @@ uniform mat4 projectionMatrix;
 uniform vec3 uOrigin;
 uniform float uStep;
 uniform uint uPrinted;
+/** What may be reached. */
+uniform vec3 uVolumeMin;
+uniform vec3 uVolumeMax;
+uniform vec3 uWarning;
 
 const uint TRAVEL = ${FLAGS.travel}u;
 const uint BREAK = ${FLAGS.break}u;
@@ -46,6 +51,10 @@ vec3 placeOf(uvec4 v) {
 }
 uint featureOf(uvec4 v) {
   return (v.z >> ${FIELDS.feature.shift}) & ${mask(FIELDS.feature.bits)};
+}
+/** True if one end lies outside, by more than positions are rounded. */
+bool leavesVolume(vec3 from, vec3 to) {
+  return any(lessThan(min(from, to), uVolumeMin - 0.01)) || any(greaterThan(max(from, to), uVolumeMax + 0.01));
 }
 /** A place that is clipped away. */
 const vec4 NOWHERE = vec4(0.0, 0.0, -2.0, 1.0);
@@ -67,7 +76,7 @@ vec3 lit(vec3 colour, vec3 towards) {
 `;
 
 /** With `LIT_AT_CORNERS` defined the light is computed at the corners alone: cheaper, less round near by. */
-export const BEAD_VERTEX = /* glsl */ `${PULL}
+export const BEAD_VERTEX = /* glsl */ `${PULL}${COLOUR}
 uniform vec3 cameraPosition;
 uniform uint uFeatures;
 uniform int uStride;
@@ -76,8 +85,11 @@ uniform float uBedZ;
 /** Millimetres that a pixel covers, for each millimetre of distance. */
 uniform float uPixelAngle;
 uniform vec2 uDefaultSize;
-uniform vec3 uPalette[${FEATURE_COUNT_MAX}];
 uniform vec3 uRemaining;
+/** Bit by object: not drawn. */
+uniform uint uHiddenObjects[8];
+/** The object that stands out; 0: none does. */
+uniform uint uObject;
 
 #ifndef LIT_AT_CORNERS
 out vec3 vNormal;
@@ -96,7 +108,9 @@ const float OVERLAP = 1.3;
 const uint WALLS = ${WALLS}u;
 
 bool shown(uvec4 v) {
-  return (v.z & NOT_LAID) == 0u && ((uFeatures >> featureOf(v)) & 1u) == 1u;
+  if ((v.z & NOT_LAID) != 0u || ((uFeatures >> featureOf(v)) & 1u) == 0u) return false;
+  uint object = objectOf(v);
+  return ((uHiddenObjects[object >> 5] >> (object & 31u)) & 1u) == 0u;
 }
 vec2 sizeOf(uvec4 v) {
   float width = float((v.x >> ${FIELDS.width.shift}) & ${mask(FIELDS.width.bits)}) * SIZE_STEP;
@@ -183,7 +197,9 @@ void main() {
   vec2 lean = wall ? vec2(clamp(seen.x * 5.0, -1.0, 1.0), 0.4 * seen.y) : vec2(0.15 * seen.x, clamp(seen.y * 8.0, -1.0, 1.0));
   vec3 surface = normalize(lightRight * lean.x + lightUp * lean.y + 1e-3 * sight / length(sight));
   vec3 normal = mat3(viewMatrix) * mix(round_, surface, uHeightScale > 1.0 ? 0.8 : smoothstep(0.2, 0.6, pixel / min(size.x, height)));
-  vec3 colour = uPalette[featureOf(own)];
+  vec3 colour = colourOf(own, bead * uStride, texel);
+  if (leavesVolume(from, to)) colour = mix(colour, uWarning, 0.8);
+  if (uObject != 0u && objectOf(own) != uObject) colour = mix(colour, uRemaining, 0.7);
   vColour = uBase + uint(bead * uStride) < uPrinted ? colour : mix(colour, uRemaining, 0.84);
 #ifdef LIT_AT_CORNERS
   vColour = lit(vColour, normal);
@@ -214,38 +230,74 @@ void main() {
 export const TRAVEL_VERTEX = /* glsl */ `${PULL}
 uniform vec3 uTravel;
 uniform vec3 uWipe;
+/** Bit 0: travels are shown; bit 1: wipes. */
+uniform uint uLines;
 out vec3 vColour;
 
 void main() {
   int segment = gl_VertexID >> 1;
   uvec4 own = vertexAt(segment + ${LEAD_TEXELS});
-  vColour = (own.z & WIPE) != 0u ? uWipe : uTravel;
+  bool wipe = (own.z & WIPE) != 0u;
+  vColour = wipe ? uWipe : uTravel;
   gl_Position = NOWHERE;
-  if ((own.z & NOT_LAID) != TRAVEL) return;
-  uvec4 v = (gl_VertexID & 1) == 1 ? own : vertexAt(segment + ${LEAD_TEXELS - 1});
-  gl_Position = projectionMatrix * (viewMatrix * vec4(placeOf(v), 1.0));
+  if ((own.z & NOT_LAID) != TRAVEL || (uLines & (wipe ? 2u : 1u)) == 0u) return;
+  vec3 to = placeOf(own);
+  vec3 from = placeOf(vertexAt(segment + ${LEAD_TEXELS - 1}));
+  if (leavesVolume(from, to)) vColour = uWarning;
+  gl_Position = projectionMatrix * (viewMatrix * vec4((gl_VertexID & 1) == 1 ? to : from, 1.0));
 }
 `;
 
+/** Shapes of markers: seams round, retractions pointing down, their ends up, tool changes a diamond, pauses a square. */
+const MARKER_SHAPES = { round: 0, down: 1, up: 2, diamond: 3, square: 4 } as const;
+
 export const MARKER_VERTEX = /* glsl */ `${PULL}
 uniform uint uMarkers;
+uniform bool uToolChanges;
 uniform float uMarkerPx;
 uniform vec3 uRetract;
 uniform vec3 uUnretract;
 uniform vec3 uSeam;
+uniform vec3 uToolChange;
+uniform vec3 uPause;
 out vec3 vColour;
+flat out int vShape;
 
 void main() {
   uvec4 own = vertexAt(gl_VertexID + ${LEAD_TEXELS});
   uint kind = own.z & uMarkers;
-  vColour = (kind & ${FLAGS.seam}u) != 0u ? uSeam : (kind & ${FLAGS.retract}u) != 0u ? uRetract : uUnretract;
-  gl_PointSize = uMarkerPx;
+  bool changes = uToolChanges && (own.y & ${EVENTS.toolChange}u) != 0u;
+  float size = 1.0;
+  if ((kind & ${FLAGS.pause}u) != 0u) { vColour = uPause; vShape = ${MARKER_SHAPES.square}; size = 1.7; }
+  else if (changes) { vColour = uToolChange; vShape = ${MARKER_SHAPES.diamond}; size = 2.0; }
+  else if ((kind & ${FLAGS.seam}u) != 0u) { vColour = uSeam; vShape = ${MARKER_SHAPES.round}; }
+  else if ((kind & ${FLAGS.retract}u) != 0u) { vColour = uRetract; vShape = ${MARKER_SHAPES.down}; size = 1.3; }
+  else { vColour = uUnretract; vShape = ${MARKER_SHAPES.up}; size = 1.3; }
+  gl_PointSize = uMarkerPx * size;
   gl_Position = NOWHERE;
-  if (kind == 0u) return;
+  if (kind == 0u && !changes) return;
   vec4 eye = viewMatrix * vec4(placeOf(own), 1.0);
   // In front of the bead that it marks.
   eye.xyz *= 1.0 - 0.4 / max(length(eye.xyz), 1.0);
   gl_Position = projectionMatrix * eye;
+}
+`;
+
+export const MARKER_FRAGMENT = /* glsl */ `
+precision highp float;
+precision highp int;
+in vec3 vColour;
+flat in int vShape;
+out vec4 colour;
+void main() {
+  vec2 at = 2.0 * gl_PointCoord - 1.0;
+  bool inside = true;
+  if (vShape == ${MARKER_SHAPES.round}) inside = dot(at, at) <= 1.0;
+  else if (vShape == ${MARKER_SHAPES.down}) inside = abs(at.x) <= 0.5 * (1.0 - at.y);
+  else if (vShape == ${MARKER_SHAPES.up}) inside = abs(at.x) <= 0.5 * (1.0 + at.y);
+  else if (vShape == ${MARKER_SHAPES.diamond}) inside = abs(at.x) + abs(at.y) <= 1.0;
+  if (!inside) discard;
+  colour = vec4(vColour, 1.0);
 }
 `;
 

@@ -4,6 +4,7 @@
  * Does not know: vertices, drawing. Units: layer and vertex indices.
  */
 import { CATEGORICAL_MODES, COLOUR_MODES, type ColourMode, type ValueRange } from './colours';
+import type { LayerList, VertexRange } from './layers';
 import type { LayerIndex, VertexIndex } from './units';
 import type { FeatureName } from './vertex';
 
@@ -19,7 +20,7 @@ export interface Shown {
   readonly vertexFrom: VertexIndex | null;
   readonly vertexTo: VertexIndex | null;
   readonly travel: boolean;
-  /** Travels over what was just printed; shown with `travel` too. */
+  /** Travels over what was just printed; not among those of `travel`. */
   readonly wipes: boolean;
   readonly retractions: boolean;
   readonly seams: boolean;
@@ -52,4 +53,19 @@ export const isColourMode = (mode: string): mode is ColourMode =>
 export function validRange(mode: ColourMode, range: ValueRange | null): ValueRange | null {
   if (!range || CATEGORICAL_MODES.includes(mode) || !range.every(Number.isFinite)) return null;
   return range[0] <= range[1] ? range : [range[1], range[0]];
+}
+
+/** The vertices that are drawn, in order. */
+export function shownRanges(shown: Shown, layers: LayerList, vertexCount: number): VertexRange[] {
+  const { layerFrom, layerTo, vertexFrom, vertexTo } = shown;
+  const whole = layers.range(layerFrom, Math.min(layerTo, layers.count - 1), vertexCount);
+  const end = Math.max(vertexTo === null ? whole.end : Math.min(whole.end, vertexTo + 1), whole.first);
+  if (vertexFrom === null || end === whole.first) return [{ first: whole.first, end }];
+  const top = layers.layerOf(end - 1);
+  const topFirst = Math.max(layers.range(top, top, vertexCount).first, whole.first);
+  const first = Math.min(Math.max(vertexFrom, topFirst), end);
+  return [
+    { first: whole.first, end: topFirst },
+    { first, end },
+  ];
 }

@@ -1,9 +1,9 @@
 /**
- * Some vertices, taken out of the store for whoever asks for them.
+ * Some vertices or their channels, taken out of the store for whoever asks for them.
  *
  * Does not know: what they are wanted for. Units: vertex indices; words as in docs/vertex.md.
  */
-import { LEAD_TEXELS, type VertexStore } from './chunks';
+import { LEAD_TEXELS, type TexelStore } from './chunks';
 import type { VertexRange } from './layers';
 import { WORDS_PER_VERTEX } from './vertex';
 
@@ -11,7 +11,7 @@ import { WORDS_PER_VERTEX } from './vertex';
 export const SLICE_MAX = 1 << 16;
 
 /** What there is of the range, not more than {@link SLICE_MAX}. */
-export function sliceOf(store: VertexStore, { first, end }: VertexRange): Uint32Array<ArrayBuffer> {
+export function sliceOf(store: TexelStore, { first, end }: VertexRange): Uint32Array<ArrayBuffer> {
   const from = Math.max(0, Math.floor(first));
   const to = Math.min(Math.floor(end), store.count, from + SLICE_MAX);
   const words = new Uint32Array(Math.max(0, to - from) * WORDS_PER_VERTEX);

@@ -41,7 +41,7 @@ const SAMPLES = 4;
 const BUFFER_SIDE_MAX = 4096;
 
 /** Where to draw. */
-export type Surface = 'canvas' | 'picture';
+export type Surface = 'canvas' | 'picture' | WebGLRenderTarget;
 
 export class Stage {
   readonly renderer: WebGLRenderer;
@@ -182,7 +182,9 @@ export class Stage {
   }
 
   #aim(surface: Surface): void {
-    this.renderer.setRenderTarget(surface === 'picture' ? this.#picture : null);
+    this.renderer.setRenderTarget(
+      surface === 'canvas' ? null : surface === 'picture' ? this.#picture : surface,
+    );
   }
 }
 

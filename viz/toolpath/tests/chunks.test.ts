@@ -78,6 +78,7 @@ describe('the store of vertices', () => {
     expect(store.box()?.min.slice(0, 2)).toEqual([10, 10]);
     expect(store.box()?.max.slice(0, 2)).toEqual([20, 20]);
     expect(store.boxOfAll()?.min[0]).toBe(1);
+    expect(store.boxOfPlaces()?.max[0]).toBe(900);
     expect(new VertexStore(HEADER).box()).toBeNull();
   });
 });

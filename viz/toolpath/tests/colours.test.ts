@@ -1,5 +1,13 @@
 import { describe, expect, test } from 'vitest';
-import { CATEGORIES, COLOUR_MODES, categoryColour, colourTable, modeNumber, RAMP } from '../src/colours';
+import {
+  CATEGORIES,
+  COLOUR_MODES,
+  categoryColour,
+  colourTable,
+  modeNumber,
+  RAMP_LENGTH,
+  RAMPS,
+} from '../src/colours';
 import { rgb } from '../src/palette';
 import { isColourMode, validRange } from '../src/shown';
 
@@ -10,10 +18,11 @@ function luminance(colour: readonly [number, number, number]): number {
 }
 
 describe('colours of values', () => {
-  test('the ramp grows brighter all the way', () => {
-    const bright = RAMP.map((colour) => luminance(rgb(colour)));
+  test.each(['light', 'dark'] as const)('%s: the ramp grows brighter all the way', (theme) => {
+    const ramp = RAMPS[theme];
+    const bright = ramp.map((colour) => luminance(rgb(colour)));
     for (let at = 1; at < bright.length; at++) expect(bright[at]).toBeGreaterThan(bright[at - 1] ?? 1);
-    expect(colourTable(RAMP)).toHaveLength(3 * RAMP.length);
+    expect(colourTable(ramp)).toHaveLength(3 * RAMP_LENGTH);
   });
 
   test('tools and objects have colours of their own, over and over; no object has none', () => {

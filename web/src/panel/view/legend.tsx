@@ -122,7 +122,7 @@ const GRADIENT = `linear-gradient(to right, ${RAMP.join(', ')})`;
 function missing(mode: ColourMode): string | null {
   const { found, isWhole } = ranges.value;
   if (PLANNED_MODES.includes(mode) || mode === 'layerTime') {
-    if (summary.value && summary.value.time === null && isWhole) return 'Needs a machine that is in order.';
+    if (summary.value?.time === null) return 'Needs a machine that is in order.';
     if (!isWhole && PLANNED_MODES.includes(mode)) return 'Computing …';
   }
   return found[mode] ? null : 'The file does not say.';

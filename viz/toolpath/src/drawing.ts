@@ -1,0 +1,318 @@
+/**
+ * Draws what the view shows: quick pictures from the coarse path, the full one in slices, and what lies over them.
+ *
+ * Does: owns what is on the GPU and brings it up to date from the view's state. Does not know: when to draw (frames.ts), how
+ * the state changes (view.ts). Units: vertex indices, mm.
+ */
+import { Scene } from 'three';
+import { BedObjects } from './bed';
+import { type BoxMm, type CameraState, unionOf, type ViewSize } from './camera';
+import type { ColourMode, ColourRanges } from './colours';
+import type { Content } from './content';
+import type { Drawn, Painter } from './frames';
+import { HighlightObject } from './highlight';
+import { LayerTimes } from './layer_times';
+import { cut, lengthOf, type VertexRange } from './layers';
+import { NozzleObject } from './nozzle';
+import { featureMask, type Palette } from './palette';
+import { PathObjects } from './path';
+import { ALL_PRINTED } from './path_uniforms';
+import { type Shown, shownRanges } from './shown';
+import { pixelAngle, Stage, type Surface } from './stage';
+import { SurfaceObject } from './surface';
+import { FLAGS } from './vertex';
+
+export const EMPTY_BOX: BoxMm = { min: [-50, -50, 0], max: [50, 50, 50] };
+
+/** What there is to be drawn; the view changes it. */
+export interface Model {
+  content: Content | null;
+  camera: CameraState;
+  bedBox: BoxMm | null;
+  shown: Shown;
+  /** The first vertex that is not printed. */
+  printed: number;
+  mode: ColourMode;
+  /** The user's own. */
+  limits: ColourRanges;
+  object: number | null;
+  volume: BoxMm | null;
+}
+
+/** How far a full picture is. */
+export interface Progress {
+  readonly surface: Surface;
+  readonly camera: CameraState;
+  /** CSS pixels, and pixels of the surface for each. */
+  readonly size: ViewSize;
+  readonly ratio: number;
+  readonly ranges: readonly VertexRange[];
+  phase: 'beads' | 'lines' | 'done';
+  /** Vertices of the ranges that the phase has done. */
+  at: number;
+  /** The printed limit that the picture was drawn with. */
+  printed: number;
+}
+
+export class Drawing implements Painter {
+  readonly stage: Stage;
+  readonly bed = new BedObjects();
+  readonly surface = new SurfaceObject();
+  readonly nozzle = new NozzleObject();
+  readonly highlight = new HighlightObject();
+  readonly layerTimes = new LayerTimes();
+  /** Draw several samples a pixel. */
+  smooth = true;
+  readonly #model: Readonly<Model>;
+  readonly #fine = new PathObjects('whole');
+  /** For pictures in motion. */
+  readonly #coarse = new PathObjects('body');
+  readonly #bedScene = new Scene();
+  #progress: Progress | null = null;
+  readonly #onStale: () => void;
+
+  /** `onStale`: a full picture is done, but more was printed meanwhile. */
+  constructor(canvas: HTMLCanvasElement | OffscreenCanvas, model: Readonly<Model>, onStale: () => void) {
+    this.stage = new Stage(canvas);
+    this.#model = model;
+    this.#onStale = onStale;
+    this.#bedScene.add(this.bed.group, this.surface.group);
+    this.#bedScene.matrixWorldAutoUpdate = false;
+  }
+
+  /** Has the shaders compiled before they are needed: the first picture of a file need not wait for them. */
+  warmUp(): void {
+    for (const path of [this.#coarse, this.#fine]) {
+      path.showNothing();
+      for (const surface of ['canvas', 'picture'] as const) this.stage.draw(surface, path.scene);
+      path.hide();
+    }
+  }
+
+  set palette(palette: Palette) {
+    for (const path of [this.#fine, this.#coarse]) path.uniforms.palette = palette;
+    this.bed.palette = palette;
+    this.surface.palette = palette;
+    this.highlight.palette = palette;
+    this.nozzle.colour = palette.nozzle;
+    this.stage.background = palette.background;
+  }
+
+  /** A file's chunks go. */
+  empty(): void {
+    this.#fine.clear();
+    this.#coarse.clear();
+    this.layerTimes.clear();
+    this.#progress = null;
+  }
+
+  /** The context is lost: what was on the GPU is gone; what belongs to it here goes too and comes anew from the model. */
+  lost(): void {
+    this.#fine.release();
+    this.#coarse.release();
+    this.layerTimes.clear();
+    this.bed.clear();
+    this.surface.release();
+    this.nozzle.release();
+    this.highlight.release();
+    this.stage.lost();
+    this.#progress = null;
+  }
+
+  dispose(): void {
+    this.empty();
+    this.#fine.release();
+    this.#coarse.release();
+    this.bed.clear();
+    this.surface.clear();
+    this.nozzle.release();
+    this.highlight.release();
+    this.stage.dispose();
+  }
+
+  fullSegments(): number {
+    return lengthOf(this.ranges()) * (this.#linesShown() ? 2 : 1);
+  }
+
+  drawQuick(budget: number): number {
+    const { camera } = this.#model;
+    this.#look(camera, this.stage.size, this.stage.ratio);
+    this.#clear('canvas');
+    const segments = this.#drawRough(budget);
+    this.#overlay();
+    return segments;
+  }
+
+  drawSlice(budget: number, restart: boolean): Drawn {
+    if (restart || !this.#progress) {
+      this.stage.smooth = this.smooth;
+      this.#progress = this.begin('picture', this.#model.camera, this.stage.size, this.stage.ratio);
+    }
+    const progress = this.#progress;
+    const drawn = this.goOn(progress, budget);
+    if (drawn.complete) this.overlay();
+    if (drawn.complete && progress.printed !== this.#model.printed) this.#onStale();
+    return drawn;
+  }
+
+  /** Draws what was printed since the full picture over it: same places, same depths, other colours. */
+  patch(): boolean {
+    const progress = this.#progress;
+    const to = this.#model.printed;
+    if (!progress || to === ALL_PRINTED || progress.printed === ALL_PRINTED || to < progress.printed)
+      return false;
+    this.#look(progress.camera, progress.size, progress.ratio);
+    this.#fine.uniforms.printed = to;
+    for (const { first, end } of progress.ranges) {
+      this.#beads('picture', { first: Math.max(progress.printed, first), end: Math.min(to, end) });
+    }
+    progress.printed = to;
+    this.overlay();
+    return true;
+  }
+
+  overlay(): void {
+    const { camera } = this.#progress ?? this.#model;
+    this.#look(camera, this.stage.size, this.stage.ratio);
+    this.stage.present();
+    this.#overlay();
+  }
+
+  fence(): () => boolean {
+    return this.stage.fence();
+  }
+
+  ranges(): VertexRange[] {
+    const { content, shown } = this.#model;
+    return content ? shownRanges(shown, content.layers, content.store.count) : [];
+  }
+
+  /** Begins a full picture: clears, and draws the bed. */
+  begin(surface: Surface, camera: CameraState, size: ViewSize, ratio: number): Progress {
+    const { content, printed } = this.#model;
+    this.#look(camera, size, ratio);
+    this.#clear(surface);
+    if (content) this.#fine.sync(content.store.chunks, content.channels.chunks);
+    return { surface, camera, size, ratio, ranges: this.ranges(), phase: 'beads', at: 0, printed };
+  }
+
+  /** Goes on with a full picture by about so many segments. */
+  goOn(progress: Progress, budget: number): Drawn {
+    const { surface, ranges } = progress;
+    this.#look(progress.camera, progress.size, progress.ratio);
+    this.#apply(this.#fine);
+    this.#fine.uniforms.printed = progress.printed;
+    const total = lengthOf(ranges);
+    let left = Math.max(budget, 1);
+    let segments = 0;
+    while (left > 0 && progress.phase !== 'done') {
+      const count = Math.min(left, total - progress.at);
+      for (const part of cut(ranges, progress.at, count)) {
+        if (progress.phase === 'beads') this.#beads(surface, part);
+        else this.#lines(surface, part);
+      }
+      segments += count;
+      left -= Math.max(count, 1);
+      progress.at += count;
+      if (progress.at < total) continue;
+      progress.phase = progress.phase === 'beads' && this.#linesShown() ? 'lines' : 'done';
+      progress.at = 0;
+    }
+    return { segments, complete: progress.phase === 'done' };
+  }
+
+  /** Sets the camera and what depends on it. */
+  #look(camera: CameraState, size: ViewSize, ratio: number): void {
+    const { bedBox, content } = this.#model;
+    const box = unionOf(unionOf(bedBox, content?.store.boxOfPlaces() ?? null), this.surface.box);
+    this.stage.look(camera, box ?? EMPTY_BOX, size);
+    const angle = pixelAngle(camera, size);
+    for (const { uniforms } of [this.#fine, this.#coarse]) uniforms.setPixels(angle / ratio, ratio);
+    this.nozzle.pixelAngle = angle;
+    this.highlight.view = size;
+  }
+
+  #clear(surface: Surface): void {
+    this.stage.clear(surface);
+    this.stage.draw(surface, this.#bedScene);
+  }
+
+  /** Brings a path's uniforms up to date. */
+  #apply({ uniforms }: PathObjects): void {
+    const { content, shown, mode, limits, object, volume } = this.#model;
+    if (content) uniforms.header = content.header;
+    uniforms.features = featureMask(shown.hiddenFeatures);
+    uniforms.hiddenObjects = shown.hiddenObjects;
+    uniforms.object = object;
+    uniforms.volume = volume;
+    uniforms.setColour(mode, limits[mode] ?? content?.ranges[mode] ?? null);
+    uniforms.set('uLayerTimes', this.layerTimes.texture);
+    uniforms.set('uLayerCount', this.layerTimes.count);
+    uniforms.setLines(shown.travel, shown.wipes);
+    uniforms.setMarkers(
+      (shown.retractions ? FLAGS.retract | FLAGS.unretract : 0) |
+        (shown.seams ? FLAGS.seam : 0) |
+        (shown.pauses ? FLAGS.pause : 0),
+      shown.toolChanges,
+    );
+  }
+
+  #beads(surface: Surface, range: VertexRange): void {
+    const parts = this.#model.content?.store.split(range) ?? [];
+    if (parts.length === 0) return;
+    this.#fine.showBeads(parts.map((part) => ({ range: part, stride: 1 })));
+    this.stage.draw(surface, this.#fine.scene);
+  }
+
+  #lines(surface: Surface, range: VertexRange): void {
+    const { travel, wipes } = this.#model.shown;
+    const parts = this.#model.content?.store.split(range) ?? [];
+    if (parts.length === 0) return;
+    this.#fine.showLines(parts, { travels: travel || wipes, markers: this.#markersShown() });
+    this.stage.draw(surface, this.#fine.scene);
+  }
+
+  #markersShown(): boolean {
+    const { retractions, seams, toolChanges, pauses } = this.#model.shown;
+    return retractions || seams || toolChanges || pauses;
+  }
+
+  #linesShown(): boolean {
+    const { travel, wipes } = this.#model.shown;
+    return travel || wipes || this.#markersShown();
+  }
+
+  /** What lies over the picture. */
+  #overlay(): void {
+    if (this.highlight.isShown) this.stage.draw('canvas', this.highlight.scene);
+    if (this.nozzle.isShown) this.stage.draw('canvas', this.nozzle.scene);
+  }
+
+  #drawRough(budget: number): number {
+    const { content, printed } = this.#model;
+    if (!content) return 0;
+    const { rough } = content;
+    const ranges = this.ranges();
+    const total = lengthOf(ranges);
+    this.#coarse.sync(rough.store.chunks, rough.channels.chunks);
+    this.#apply(this.#coarse);
+    this.#coarse.uniforms.printed = printed === ALL_PRINTED ? ALL_PRINTED : rough.coarseOf(printed);
+    let segments = 0;
+    for (const range of ranges) {
+      const share = (budget * (range.end - range.first)) / Math.max(total, 1);
+      const reduced = rough.reduced(range, content.layers, Math.max(share, 1));
+      const parts = reduced.ranges.flatMap((part) => rough.store.split(part));
+      if (parts.length === 0) continue;
+      this.#coarse.uniforms.heightScale = reduced.layerStep;
+      this.#coarse.showBeads(parts.map((part) => ({ range: part, stride: reduced.stride })));
+      this.stage.draw('canvas', this.#coarse.scene);
+      segments += lengthOf(reduced.ranges) / reduced.stride;
+    }
+    if (this.#linesShown() && total < budget) {
+      this.#fine.sync(content.store.chunks, content.channels.chunks);
+      this.#apply(this.#fine);
+      for (const range of ranges) this.#lines('canvas', range);
+    }
+    return segments;
+  }
+}
