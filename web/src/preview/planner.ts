@@ -128,7 +128,7 @@ class WasmPreview implements FilePreview {
 
   constructor(config: string | null) {
     this.#inner = new Preview(config ?? undefined);
-    this.#planned = this.#inner;
+    this.#planned = this.#inner as Preview & Planned;
     if (config !== null) this.#planned.want_channels?.();
   }
 
