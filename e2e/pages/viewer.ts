@@ -120,8 +120,9 @@ export class Viewer {
     for (let tries = 0; tries < TRIES_MAX; tries += 1) {
       // The full picture comes after the quick one, some time after the last change.
       await this.page.waitForTimeout(SETTLE_MS);
+      const isFull = (await this.view.getAttribute('aria-busy')) === 'false';
       const now = await take();
-      if (now.equals(before)) return now;
+      if (isFull && now.equals(before)) return now;
       before = now;
     }
     throw new Error('the picture does not settle');

@@ -4,10 +4,14 @@ import { expect, test } from '../fixtures/files.ts';
 import { sample } from '../pages/panel.ts';
 import { Viewer } from '../pages/viewer.ts';
 
+/** Neither a graphics card nor a stand-in for one. */
+const GRAPHICS = /--use-|swiftshader/;
+const NO_GRAPHICS = ['--disable-gpu', '--disable-software-rasterizer'];
+
 test.use({
   launchOptions: {
     executablePath: findBrowser() ?? '',
-    args: [...browserArguments(), '--disable-3d-apis'],
+    args: [...browserArguments().filter((one) => !GRAPHICS.test(one)), ...NO_GRAPHICS],
   },
 });
 

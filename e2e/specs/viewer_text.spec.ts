@@ -17,7 +17,7 @@ test('a click finds the segment, its facts and its line; the text goes there', a
   await panel.drop(path);
   await viewer.ready();
   await viewer.openText();
-  await viewer.button('View from the top').click();
+  await viewer.button('Top').click();
   const without = await viewer.picture();
   const { x, y } = await viewer.middle();
   await page.mouse.click(x, y);
@@ -45,8 +45,8 @@ test('a pointer that rests on a segment is told what it is on', async ({ panel, 
   const { x, y } = await viewer.middle();
   await page.mouse.move(x, y);
   await expect(viewer.region.getByRole('tooltip')).toHaveText(/Line [\d,]+/);
-  await page.mouse.move(x - 300, y + 150);
-  await expect(viewer.region.getByRole('tooltip')).not.toContainText('Nothing');
+  await page.mouse.move(0, 0);
+  await expect(viewer.region.getByRole('tooltip')).toHaveCount(0);
 });
 
 test('a line that is chosen by key is shown as the last one made', async ({ panel, page }) => {
@@ -71,11 +71,12 @@ test('a line that is chosen by key is shown as the last one made', async ({ pane
   await page.keyboard.press('ArrowDown');
   await expect(viewer.line(wanted + 1)).toHaveAttribute('aria-selected', 'true');
   await page.keyboard.press('PageUp');
-  await expect(viewer.line(wanted + 1)).not.toHaveAttribute('aria-selected', 'true');
+  const chosen = viewer.text.getByRole('option', { selected: true });
+  await expect.poll(async () => Number(await chosen.getAttribute('aria-posinset'))).toBeLessThan(wanted);
   await page.keyboard.press('Home');
   await expect(viewer.line(1)).toHaveAttribute('aria-selected', 'true');
   await page.keyboard.press('End');
-  await expect(viewer.text.getByRole('option', { selected: true })).toContainText(String(lines.length - 1));
+  await expect(chosen).toHaveAttribute('aria-posinset', String(lines.length - 1));
 });
 
 test('moves that are played take the text with them', async ({ panel, page }) => {

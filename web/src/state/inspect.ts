@@ -46,7 +46,8 @@ export const command = computed(() => {
 /** The line that the text is to show: where the cursor is, else what is being printed. */
 export const lineInView = computed<number | null>(() => {
   const at = cursor.value;
-  if (at) return at.line ?? (segment.value?.vertex === at.vertex ? segment.value.line : null);
+  // While moves are played the line may be some of them behind.
+  if (at) return at.line ?? segment.value?.line ?? null;
   return isShown.value ? (progress.value?.line ?? null) : null;
 });
 
@@ -55,14 +56,12 @@ export function followCursor(): () => void {
   let isBusy = false;
   const look = async (): Promise<void> => {
     isBusy = true;
-    for (;;) {
-      const at = cursor.peek();
+    for (let at = cursor.peek(), isOld = true; isOld; ) {
       const found = at && (await lookUp(at.vertex, at.line));
-      const now = cursor.peek();
-      if (now !== at && now?.vertex !== at?.vertex) continue;
       segment.value = found;
       if (found?.line) wantLine(found.line);
-      break;
+      isOld = cursor.peek() !== at;
+      at = cursor.peek();
     }
     isBusy = false;
   };

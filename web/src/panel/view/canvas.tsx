@@ -33,6 +33,8 @@ import { machineSummary } from '../machine_summary';
 export const viewFailure = signal<string | null>(null);
 /** Layers are drawn from above, for want of 3D. */
 export const isFlat = signal(false);
+/** What is seen is not yet the full picture. */
+const isDrawing = signal(false);
 /** The view that is there, for the buttons over it. */
 export const view = signal<ToolpathHost | null>(null);
 /** What the pointer rests on, and where in the view. */
@@ -192,6 +194,8 @@ function take(event: ViewEvent): void {
     viewFailure.value = event.reason;
     isFlat.value = event.isFlat;
   }
+  if (event.type === 'frame' && event.report.kind !== 'overlay')
+    isDrawing.value = event.report.kind === 'quick';
   if (event.type === 'ranges') ranges.value = { found: event.ranges, isWhole: event.isWhole };
 }
 
@@ -307,6 +311,7 @@ export function Canvas(): JSX.Element {
       class="canvas-place"
       role="application"
       aria-label={label}
+      aria-busy={isDrawing.value}
       // biome-ignore lint/a11y/noNoninteractiveTabindex: the view is turned by keyboard
       tabIndex={0}
       onKeyDown={onKey}
