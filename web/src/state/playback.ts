@@ -105,7 +105,9 @@ async function fetchFrom(vertex: number): Promise<void> {
   const slice = await verticesOf(vertex, vertex + WINDOW);
   isFetching = false;
   if (!isPlaying.peek() || plan !== summary.peek()) return;
-  if (!slice || slice.vertices.length === 0) return stop();
+  if (!slice) return stop();
+  // The view's worker is behind the one that reads the file: the next step asks again.
+  if (slice.vertices.length === 0) return;
   timeline = new Timeline(vertex, timesOf(slice, meanTime(vertex)));
   at = timeline.timeAt(vertex);
   if (vertex !== shown()) showPlayed(vertex);

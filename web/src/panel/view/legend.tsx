@@ -49,7 +49,9 @@ function Features(): JSX.Element {
           <th scope="col" class="share">
             Share
           </th>
-          <th scope="col">Filament</th>
+          <th scope="col" class="filament">
+            Filament
+          </th>
         </tr>
       </thead>
       <tbody>
@@ -72,7 +74,7 @@ function Features(): JSX.Element {
                 </th>
                 <td>{time > 0 ? formatDuration(time) : '–'}</td>
                 <td class="share">{all > 0 ? percent(time / all) : '–'}</td>
-                <td>{formatNumber(filament / 1000, 2)} m</td>
+                <td class="filament">{formatNumber(filament / 1000, 2)} m</td>
               </tr>
             );
           })}
