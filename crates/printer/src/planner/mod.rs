@@ -19,7 +19,7 @@ mod tests;
 use std::collections::VecDeque;
 
 use gcode::{Action, LineNumber, Wait};
-use motion::{Bound, Limits, LookAhead, MoveRequest, PlannedMove};
+use motion::{Bend, Bound, Limits, LookAhead, MoveRequest, PlannedMove};
 use steps::{PushError, StepGenerator};
 use units::{Hertz, MmPerS, Seconds, Ticks};
 
@@ -35,6 +35,7 @@ pub use source::{SOURCE_BYTES_MAX, Source};
 pub use crate::pace::Pace;
 
 use crate::{
+    arcs,
     config::{PrinterConfig, UnreachableSpeed},
     error::{ErrorCode, PrinterError},
     machine::{self, EXTRUDER},
@@ -270,7 +271,7 @@ impl Planner {
         feed: MmPerS,
         line: LineNumber,
     ) -> Result<(), PrinterError> {
-        self.push(to, feed, line, Pace::default())
+        self.push(to, None, feed, line, Pace::default())
     }
 
     /// The next item of the plan.
@@ -308,8 +309,8 @@ impl Planner {
                 self.finish_run();
                 continue;
             }
-            if let Some(chord) = source.next_chord() {
-                self.judge_and_push(&chord, source)?;
+            if let Some(piece) = source.next_piece() {
+                self.judge_and_push(&piece.chord, Some(&arcs::bend(&piece)), source)?;
                 continue;
             }
             match source.next() {
@@ -327,8 +328,11 @@ impl Planner {
     fn act(&mut self, action: Action, source: &mut Source) -> Result<(), PrinterError> {
         let line = source.line();
         match action {
-            Action::Move(mv) => self.judge_and_push(&mv, source)?,
-            Action::Arc(arc) => source.draw(&arc),
+            Action::Move(mv) => self.judge_and_push(&mv, None, source)?,
+            Action::Arc(arc) => {
+                self.judge_arc(&arc)?;
+                source.draw(&arc);
+            }
             Action::VelocityLimit(limit) => self.limit(limit),
             Action::SetTemperature { heater, target, wait: Wait::No } => {
                 self.defer(line, TimedAction::SetTemperature { heater, target });
@@ -405,11 +409,20 @@ impl Planner {
         }
     }
 
-    fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber, pace: Pace) -> Result<(), PrinterError> {
+    fn push(
+        &mut self,
+        to: Position,
+        bend: Option<&Bend>,
+        feed: MmPerS,
+        line: LineNumber,
+        pace: Pace,
+    ) -> Result<(), PrinterError> {
         if to == self.position {
             return Ok(());
         }
-        self.step_rates.judge_request(self.position, to, feed, &self.limits, line)?;
+        for end in arcs::straight_ends(self.position, to, bend) {
+            self.step_rates.judge_request(self.position, end, feed, &self.limits, line)?;
+        }
         if self.run == Run::None {
             self.look_ahead.begin_run();
             self.course.begin_run(&mut self.generator);
@@ -423,7 +436,7 @@ impl Planner {
         }
         let before = self.look_ahead.len();
         let request = MoveRequest { from: self.position, to, feed, tag: line.0 };
-        self.look_ahead.push(&request).map_err(|error| wrong(&error).at_line(line.0))?;
+        self.look_ahead.push_along(&request, bend).map_err(|error| wrong(&error).at_line(line.0))?;
         // The look-ahead drops moves without length.
         let pushed = (self.look_ahead.len() - before) as u64;
         if pushed > 0 {
@@ -432,7 +445,7 @@ impl Planner {
         self.moves_pushed += pushed;
         self.position = to;
         if let Some(bound) = &mut self.bound {
-            bound.push(&request, &self.limits);
+            bound.push_along(&request, bend, &self.limits);
         }
         Ok(())
     }

@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 
 use gcode::{Action, LineNumber, Move, Wait};
-use motion::{Limits, LookAhead, MoveRequest, PlannedMove};
+use motion::{Bend, Limits, LookAhead, MoveRequest, PlannedMove};
 use units::Seconds;
 
 use super::encoder::Segment;
@@ -52,7 +52,7 @@ impl Estimate {
         })
     }
 
-    pub(super) fn mv(&mut self, mv: &Move, segment: Segment, layer: u32) {
+    pub(super) fn mv(&mut self, mv: &Move, bend: Option<&Bend>, segment: Segment, layer: u32) {
         let (from, to) = (mv.from.to_array(), mv.to.to_array());
         if from == to {
             return;
@@ -67,7 +67,7 @@ impl Estimate {
         };
         let request = MoveRequest { from, to, feed: mv.feed, tag: layer << TAG_BITS | feature };
         let before = self.look_ahead.len();
-        if self.look_ahead.push(&request).is_err() {
+        if self.look_ahead.push_along(&request, bend.filter(|bend| bend.fits(&from, &to))).is_err() {
             self.failed = true;
             self.look_ahead.begin_run();
             self.lines.clear();

@@ -14,6 +14,7 @@ pub mod vertex;
 use std::collections::VecDeque;
 
 use gcode::{Action, Annotation, CHORD_TOLERANCE, Chords, LineNumber, Move};
+use motion::Bend;
 use units::{Mm, Seconds};
 
 use self::{
@@ -22,6 +23,7 @@ use self::{
     vertex::{FEATURES, Grid, WORDS},
 };
 use crate::{
+    arcs,
     check::{CheckReport, Checker},
     config::PrinterConfig,
 };
@@ -168,8 +170,8 @@ impl Preview {
             if out.len() >= enough {
                 return true;
             }
-            if let Some(chord) = self.arc.as_mut().and_then(Iterator::next) {
-                self.mv(&chord, out);
+            if let Some(piece) = self.arc.as_mut().and_then(Chords::next_piece) {
+                self.mv(&piece.chord, Some(&arcs::bend(&piece)), out);
                 continue;
             }
             self.arc = None;
@@ -203,7 +205,7 @@ impl Preview {
             self.checker.add(estimate.too_fast.take());
         }
         match action {
-            Action::Move(mv) => self.mv(&mv, out),
+            Action::Move(mv) => self.mv(&mv, None, out),
             Action::Arc(arc) => self.arc = Some(arc.chords(CHORD_TOLERANCE)),
             Action::Home { .. } => self.encoder.lose_way(),
             Action::SelectTool(tool) => self.encoder.select_tool(tool),
@@ -214,10 +216,10 @@ impl Preview {
         }
     }
 
-    fn mv(&mut self, mv: &Move, out: &mut Vec<u32>) {
+    fn mv(&mut self, mv: &Move, bend: Option<&Bend>, out: &mut Vec<u32>) {
         let segment = self.encoder.mv(mv, out);
         if let Some(estimate) = &mut self.estimate {
-            estimate.mv(mv, segment, self.encoder.layers.number());
+            estimate.mv(mv, bend, segment, self.encoder.layers.number());
             self.checker.add(estimate.too_fast.take());
         }
     }
