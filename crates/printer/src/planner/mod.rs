@@ -5,6 +5,8 @@
 //! knows no host time and no board clock: times are seconds, and step commands are ticks, from the start of a **run of
 //! motion**, which is a stretch that begins and ends at rest.
 
+#[cfg(test)]
+mod arc_tests;
 mod dynamics;
 #[cfg(test)]
 mod extrusion_tests;
