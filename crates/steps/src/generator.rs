@@ -175,6 +175,13 @@ impl<K: Kinematics> StepGenerator<K> {
         self.axes.iter().filter_map(|axis| axis.filter.as_ref())
     }
 
+    /// What the last [`Self::push`] or [`Self::end_run`] has made known of each axis' path, after pressure advance and shaping,
+    /// and the print time up to which all of them are known.
+    pub fn axis_paths(&self) -> (&[Vec<Segment>; AXES], Seconds) {
+        let known = self.axes.iter().map(|axis| axis.known).fold(f64::INFINITY, f64::min);
+        (&self.paths, Seconds(known))
+    }
+
     /// Segments that the filters hold: the most of any, see [`crate::SEGMENTS_HELD_MAX`].
     pub fn segments_held(&self) -> usize {
         self.filters().map(Filter::held).max().unwrap_or(0)

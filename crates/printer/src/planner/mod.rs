@@ -9,6 +9,9 @@
 mod arc_tests;
 mod dynamics;
 #[cfg(test)]
+mod estimate_tests;
+mod estimates;
+#[cfg(test)]
 mod extrusion_tests;
 mod guard;
 mod item;
@@ -19,6 +22,7 @@ mod skip;
 mod source;
 #[cfg(test)]
 mod tests;
+mod trace;
 
 use std::collections::VecDeque;
 
@@ -28,13 +32,16 @@ use steps::{PushError, StepGenerator};
 use units::{Hertz, MmPerS, Seconds, Ticks};
 
 use dynamics::Course;
+pub use estimates::{Estimates, FEATURE_NAMES, LayerTotal, MoveEstimate, MoveKind, Total};
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
 use paces::Paces;
-pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanStream, Ramps};
+pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanSink, PlanStream, Ramps};
 pub(crate) use skip::{Skip, Skipped};
 pub(crate) use source::Next;
 pub use source::{SOURCE_BYTES_MAX, Source};
+use trace::Trace;
+pub use trace::TraceSample;
 
 pub use crate::pace::Pace;
 
@@ -111,6 +118,8 @@ pub struct Planner {
     is_broken: bool,
     /// What the plan is held against, where somebody wants to know.
     bound: Option<Box<Bound>>,
+    /// Where somebody wants to see the axes' paths.
+    trace: Option<Box<Trace>>,
 }
 
 impl Planner {
@@ -142,6 +151,7 @@ impl Planner {
             unreachable_speed: config.printer.unreachable_speed,
             is_broken: false,
             bound: None,
+            trace: None,
         })
     }
 
@@ -294,6 +304,7 @@ impl Planner {
             match self.run {
                 Run::Ending => {
                     self.generator.end_run().map_err(|error| self.unsteppable(error, None))?;
+                    self.trace_paths();
                     self.run = Run::Draining;
                     continue;
                 }
@@ -382,22 +393,6 @@ impl Planner {
         Ok(())
     }
 
-    /// Takes an advance or a shaper; one that changes the filters lets the machine come to rest first.
-    fn set_dynamics(&mut self, action: &Action) {
-        let read = self.course.read();
-        let dynamics = match action {
-            Action::PressureAdvance { advance, smooth_time } => read.with_advance(*advance, *smooth_time),
-            Action::InputShaper(change) => read.with_shaper(change),
-            _ => return,
-        };
-        self.step_rates.set_advance(dynamics.effective_advance().slope_max());
-        if self.course.set(dynamics, self.moves_pushed) {
-            self.finish_run();
-        } else if self.moves_planned == self.moves_pushed {
-            self.course.planned(self.moves_planned, &mut self.generator);
-        }
-    }
-
     /// Attaches an action to the end of the moves read so far.
     fn defer(&mut self, line: LineNumber, action: TimedAction) {
         if self.moves_planned == self.moves_pushed {
@@ -471,6 +466,7 @@ impl Planner {
             return Err(error);
         }
         self.generator.push(&planned).map_err(|error| self.unsteppable(error, Some(planned.tag)))?;
+        self.trace_paths();
         self.planned_until = Seconds(planned.end_time());
         let pace = self.paces.take(self.moves_planned);
         self.moves_planned += 1;
