@@ -60,7 +60,7 @@ impl PlanSink for TraceFile {
     fn sample(&mut self, sample: &TraceSample) {
         let Some(open) = self.0.as_mut().filter(|open| open.failed.is_none()) else { return };
         let values = sample.position.iter().chain(&sample.velocity).chain(&sample.accel);
-        let mut write = || {
+        let write = || {
             write!(open.file, "{:.6}", sample.time.0)?;
             for value in values {
                 write!(open.file, ",{value:.6}")?;
