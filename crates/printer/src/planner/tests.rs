@@ -7,15 +7,15 @@ use units::Celsius;
 use super::*;
 use crate::{config, machine::MOTORS};
 
-const CLOCK: Hertz = Hertz(12_000_000);
+pub(super) const CLOCK: Hertz = Hertz(12_000_000);
 
-fn machine_file() -> PrinterConfig {
+pub(super) fn machine_file() -> PrinterConfig {
     let text = include_str!("../../../../samples/printer.cfg");
     config::parse(text).0.expect("the sample machine")
 }
 
 /// A planner that is homed and hot.
-fn planner() -> (Planner, Source) {
+pub(super) fn planner() -> (Planner, Source) {
     let mut planner = Planner::new(&machine_file(), CLOCK).unwrap();
     (0..3).for_each(|axis| planner.set_axis(axis, 0.0, true));
     planner.guard.extrusion = ExtrusionPermit::Allowed;
@@ -24,13 +24,13 @@ fn planner() -> (Planner, Source) {
     (planner, source)
 }
 
-fn feed(source: &mut Source, text: &str) {
+pub(super) fn feed(source: &mut Source, text: &str) {
     source.feed(text.as_bytes());
     source.end();
 }
 
 /// Everything but steps, up to the end or the first error.
-fn items(planner: &mut Planner, source: &mut Source) -> Vec<Planned> {
+pub(super) fn items(planner: &mut Planner, source: &mut Source) -> Vec<Planned> {
     let mut items = Vec::new();
     loop {
         match planner.next(source).unwrap() {
@@ -44,13 +44,13 @@ fn items(planner: &mut Planner, source: &mut Source) -> Vec<Planned> {
     }
 }
 
-fn plan(text: &str) -> Vec<Planned> {
+pub(super) fn plan(text: &str) -> Vec<Planned> {
     let (mut planner, mut source) = planner();
     feed(&mut source, text);
     items(&mut planner, &mut source)
 }
 
-fn moves(items: &[Planned]) -> Vec<PlannedMove> {
+pub(super) fn moves(items: &[Planned]) -> Vec<PlannedMove> {
     items
         .iter()
         .filter_map(|item| if let Planned::Move(mv, _) = item { Some(mv.clone()) } else { None })
