@@ -163,7 +163,9 @@ impl Compressor {
             // What begins or turns is taken by itself.
             let rest = self.times.split_off(fresh);
             let mut rest = rest.iter();
-            while let Some(&time) = rest.as_slice().first().filter(|_| self.waiting() == 0 || forward != self.forward) {
+            while let Some(&time) =
+                rest.as_slice().first().filter(|_| self.waiting() == 0 || forward != self.forward)
+            {
                 self.step(time, forward);
                 rest.next();
             }
@@ -184,8 +186,7 @@ impl Compressor {
         let times = &self.times[fresh - 1..];
         let known = self.errors.len();
         self.errors.push(self.error(self.gap_before, times[1] - times[0]));
-        let limits =
-            Gaps { shortest: self.gap_min, longest: self.hold_max, record: self.tally.gap_min };
+        let limits = Gaps { shortest: self.gap_min, longest: self.hold_max, record: self.tally.gap_min };
         let (is_usual, is_shorter) =
             append_errors(times, self.max_error, GAP_SHARE, &limits, &mut self.errors);
         let span = times[times.len() - 1] - self.times[self.first];

@@ -18,6 +18,8 @@ const CANDIDATES_MAX: usize = 4;
 const TRIES_MAX: i64 = 4;
 /// Values of `add` that take one byte on the wire.
 const ADD_SHORT: core::ops::RangeInclusive<i64> = -32..=95;
+/// Values that take two at most.
+const ADD_TWO_BYTES: core::ops::RangeInclusive<i64> = -4096..=12_287;
 /// Values of `add` that the wire can express.
 const ADD_MIN: i64 = i16::MIN as i64;
 const ADD_MAX: i64 = i16::MAX as i64;
@@ -289,7 +291,7 @@ impl Stabbing {
         best.unwrap_or_else(|| self.candidate(if self.count == 1 { 0 } else { self.middle_add() }))
     }
 
-    /// Half-way between the extreme lines, or the nearest that is short on the wire if one is between them too.
+    /// Half-way between the extreme lines, or the nearest to it that is shorter on the wire, if one is between them too.
     fn middle_add(&self) -> i64 {
         let (flattest, steepest) = (self.flattest.slope, self.steepest.slope);
         let middle = ceil(flattest + steepest - 0.5).clamp(ADD_MIN, ADD_MAX);
@@ -297,8 +299,11 @@ impl Stabbing {
             return middle;
         }
         let (first, last) = (ceil(2.0 * flattest), floor(2.0 * steepest));
-        let (first, last) = (first.max(*ADD_SHORT.start()), last.min(*ADD_SHORT.end()));
-        if first <= last { middle.clamp(first, last) } else { middle }
+        let shorter = [ADD_SHORT, ADD_TWO_BYTES].into_iter().find_map(|values| {
+            let (first, last) = (first.max(*values.start()), last.min(*values.end()));
+            (first <= last).then(|| middle.clamp(first, last))
+        });
+        shorter.unwrap_or(middle)
     }
 }
 

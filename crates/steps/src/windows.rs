@@ -56,8 +56,10 @@ impl Steps<'_> {
             let middles = map(times, |time| time - base);
             let inverses = map(numbers, |k| 1.0 / k);
             let rises = map(numbers, |k| half * (k - 1.0));
-            let low = map2(map2(map2(middles, errors, |a, b| a - b), inverses, |a, b| a * b), rises, |a, b| a - b);
-            let high = map2(map2(map2(middles, errors, |a, b| a + b), inverses, |a, b| a * b), rises, |a, b| a - b);
+            let low =
+                map2(map2(map2(middles, errors, |a, b| a - b), inverses, |a, b| a * b), rises, |a, b| a - b);
+            let high =
+                map2(map2(map2(middles, errors, |a, b| a + b), inverses, |a, b| a * b), rises, |a, b| a - b);
             lows = map2(low, lows, larger);
             highs = map2(high, highs, smaller);
             numbers = map(numbers, |k| k + LANES as f64);
