@@ -20,3 +20,4 @@ pub mod preview;
 pub mod session;
 pub mod step_rate;
 pub mod thermistor;
+pub mod transform;

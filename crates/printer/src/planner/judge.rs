@@ -36,26 +36,35 @@ impl Planner {
         }
     }
 
-    pub(super) fn judge_and_push(&mut self, mv: &Move, source: &Source) -> Result<(), PrinterError> {
+    pub(super) fn judge_and_push(&mut self, mv: &Move, source: &mut Source) -> Result<(), PrinterError> {
+        if !self.transform.is_identity() {
+            return self.judge_and_take_apart(mv, source);
+        }
         let e_offset = source.e_offset;
         let to = [mv.to.x, mv.to.y, mv.to.z, mv.to.e + e_offset];
         // Judged from where the machine is, not from where the source believes that it is.
         let [x, y, z, e] = self.position;
         let from = gcode::Position { x, y, z, e: e - e_offset };
         self.guard.judge(&Move { from, ..*mv })?;
-        let feed = self.feed(mv, to, source);
+        let feed = self.feed(mv.feed, mv.line, to, source);
         self.judge_torque(to, feed, mv.line)?;
         self.push(to, feed, mv.line, source.pace())
     }
 
     /// A move's feed; one that a factor has made faster than the motors can follow is slowed down to what they can.
-    pub(super) fn feed(&mut self, mv: &Move, to: Position, source: &Source) -> MmPerS {
+    pub(super) fn feed(
+        &mut self,
+        wanted: MmPerS,
+        line: LineNumber,
+        to: Position,
+        source: &Source,
+    ) -> MmPerS {
         if source.interpreter.speed_factor() <= 1.0 && source.interpreter.flow_factor() <= 1.0 {
-            return mv.feed;
+            return wanted;
         }
-        let feed = self.step_rates.slowed(self.position, to, mv.feed);
-        if feed < mv.feed && !core::mem::replace(&mut self.said.slowed, true) {
-            self.notice(mv.line, "a move is made slower than the factor asks: a motor cannot step faster");
+        let feed = self.step_rates.slowed(self.position, to, wanted);
+        if feed < wanted && !core::mem::replace(&mut self.said.slowed, true) {
+            self.notice(line, "a move is made slower than the factor asks: a motor cannot step faster");
         }
         feed
     }

@@ -3,7 +3,7 @@
 //! Counts what [`PlanStream`](crate::planner::PlanStream) counts: motion and the file's own dwells; neither homing nor
 //! waiting for temperatures. Times in seconds.
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, sync::Arc};
 
 use gcode::{Action, LineNumber, Move, Wait};
 use motion::{Limits, LookAhead, MoveRequest, PlannedMove};
@@ -11,7 +11,14 @@ use units::Seconds;
 
 use super::encoder::Segment;
 use super::vertex::FEATURES;
-use crate::{config::PrinterConfig, error::PrinterError, machine, planner::PLAN_CLOCK, step_rate::StepRates};
+use crate::{
+    config::PrinterConfig,
+    error::PrinterError,
+    machine,
+    planner::PLAN_CLOCK,
+    step_rate::StepRates,
+    transform::{Profiles, Transform},
+};
 
 /// What a planned move is counted under: 5 bits of the tag are the feature, the rest is the layer.
 const TRAVEL_TAG: u32 = 31;
@@ -25,6 +32,10 @@ pub(super) struct Estimate {
     /// The lines of the moves in the look-ahead.
     lines: VecDeque<LineNumber>,
     step_rates: StepRates,
+    /// From the file's coordinates to the machine's …
+    transform: Transform,
+    /// … and what can be loaded.
+    profiles: Arc<Profiles>,
     /// The first move that is found to be too fast for its motors, until it is taken.
     pub(super) too_fast: Option<PrinterError>,
     running: bool,
@@ -43,6 +54,8 @@ impl Estimate {
             look_ahead: LookAhead::with_profile(limits, machine::profile(config)).ok()?,
             lines: VecDeque::new(),
             step_rates: StepRates::new(config, PLAN_CLOCK),
+            transform: Transform::default(),
+            profiles: Arc::clone(&config.profiles),
             too_fast: None,
             running: false,
             total_s: 0.0,
@@ -66,14 +79,27 @@ impl Estimate {
             Segment::Extrusion(feature) => u32::from(feature),
         };
         let request = MoveRequest { from, to, feed: mv.feed, tag: layer << TAG_BITS | feature };
+        if self.transform.is_identity() || from[..3] == to[..3] {
+            return self.push(&request, mv.line);
+        }
+        let [x, y, z, e] = from;
+        let [x, y, z] = self.transform.machine_from_gcode([x, y, z]);
+        let mut at = [x, y, z, e];
+        for to in self.transform.pieces(from, to) {
+            self.push(&MoveRequest { from: at, to, ..request }, mv.line);
+            at = to;
+        }
+    }
+
+    fn push(&mut self, request: &MoveRequest, line: LineNumber) {
         let before = self.look_ahead.len();
-        if self.look_ahead.push(&request).is_err() {
+        if self.look_ahead.push(request).is_err() {
             self.failed = true;
             self.look_ahead.begin_run();
             self.lines.clear();
         } else if self.look_ahead.len() > before {
             // One without length is dropped.
-            self.lines.push_back(mv.line);
+            self.lines.push_back(line);
         }
         self.take();
     }
@@ -90,6 +116,10 @@ impl Estimate {
                 let limits = machine::lowered(&self.machine, self.look_ahead.limits(), limit);
                 // Limits that make no sense leave those that hold.
                 let _ = self.look_ahead.set_limits(limits);
+            }
+            Action::Skew(_) | Action::BedMesh(_) => {
+                // What cannot be loaded has been said by the check.
+                let _ = self.transform.set(action, &self.profiles);
             }
             Action::SetTemperature { wait, .. } if *wait == Wait::No => {}
             Action::SetTemperature { .. }
