@@ -177,7 +177,8 @@ fn no_parallelogram([ac, bd, ad]: [f64; 3]) -> String {
 fn described(mesh: &Mesh) -> String {
     let surface = mesh.surface();
     let [x, y] = surface.axes;
-    let [low, high] = surface.range;
+    let heights = || surface.rows().flatten().copied();
+    let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
     let mut text = format!(
         "mesh {}: X {:.1} to {:.1} mm, Y {:.1} to {:.1} mm, {} by {} points, {low:.3} to {high:.3} mm",
         mesh.name, x.min, x.max, y.min, y.max, x.count, y.count
