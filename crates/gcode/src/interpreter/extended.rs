@@ -174,7 +174,9 @@ impl Interpreter {
             }
             "SET_SKEW" => Action::Skew(call.set_skew(out)?),
             "SKEW_PROFILE" => {
-                return Ok(call.profile("skew_correction", out)?.map(|it| Action::Skew(SkewChange::Load(it))));
+                return Ok(call
+                    .profile("skew_correction", out)?
+                    .map(|it| Action::Skew(SkewChange::Load(it))));
             }
             "GET_CURRENT_SKEW" => Action::Skew(SkewChange::Report),
             "CALC_MEASURED_SKEW" => Action::Skew(call.measured_skew(out)?),

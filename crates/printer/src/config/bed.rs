@@ -58,7 +58,9 @@ fn kept(builder: &mut Builder<'_>, mut names: Vec<String>) -> Vec<String> {
     for name in names.drain(names.len().min(PROFILES_MAX)..) {
         let line = builder.document.take(&name).map_or(0, |section| section.line);
         let name = excerpt(&name);
-        builder.log.error(line, format!("[{name}]: more than {PROFILES_MAX} profiles are not read; delete some"));
+        builder
+            .log
+            .error(line, format!("[{name}]: more than {PROFILES_MAX} profiles are not read; delete some"));
     }
     names
 }
@@ -73,8 +75,7 @@ fn skews(builder: &mut Builder<'_>) -> Checked<BTreeMap<String, Skew>> {
     for section in kept(builder, names) {
         let Some(mut reader) = builder.section(&section) else { continue };
         let factor = Range::from(-SKEW_MAX).to(SKEW_MAX);
-        let [xy, xz, yz] =
-            ["xy_skew", "xz_skew", "yz_skew"].map(|key| reader.number_or(key, 0.0, factor));
+        let [xy, xz, yz] = ["xy_skew", "xz_skew", "yz_skew"].map(|key| reader.number_or(key, 0.0, factor));
         reader.finish();
         if let (Ok(xy), Ok(xz), Ok(yz)) = (xy, xz, yz) {
             skews.insert(name_of(&section), Skew { xy, xz, yz });
@@ -261,7 +262,10 @@ fn place(reader: &mut Reader<'_>, key: &'static str) -> Checked<Option<[f64; 2]>
         text.split(',').map(|part| part.trim().parse::<f64>().ok().filter(|at| at.abs() <= PLACE_MAX_MM));
     match (parts.next(), parts.next(), parts.next()) {
         (Some(Some(x)), Some(Some(y)), None) => Ok(Some([x, y])),
-        _ => Err(reader.error(key, format!("`{}` is no place; write X and Y in mm, e.g. 35, 6", excerpt(&text)))),
+        _ => {
+            Err(reader
+                .error(key, format!("`{}` is no place; write X and Y in mm, e.g. 35, 6", excerpt(&text))))
+        }
     }
 }
 
@@ -274,5 +278,6 @@ fn counts(reader: &mut Reader<'_>, key: &'static str, min: u32, max: u32) -> Che
         return Ok(());
     }
     let text = excerpt(&text);
-    Err(reader.error(key, format!("`{text}` must be one or two whole numbers from {min} to {max}, e.g. 5, 3")))
+    Err(reader
+        .error(key, format!("`{text}` must be one or two whole numbers from {min} to {max}, e.g. 5, 3")))
 }

@@ -236,7 +236,8 @@ impl<'a> Reader<'a> {
 
     /// The same of all options whose names begin so.
     pub(super) fn without_effect_beginning(&mut self, prefix: &str, why: &str) {
-        let keys: Vec<String> = self.section.entries.keys().filter(|key| key.starts_with(prefix)).cloned().collect();
+        let keys: Vec<String> =
+            self.section.entries.keys().filter(|key| key.starts_with(prefix)).cloned().collect();
         for key in keys {
             if let Some(entry) = self.section.entries.remove(&key) {
                 let name = excerpt(&self.section.name);

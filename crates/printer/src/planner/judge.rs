@@ -52,13 +52,7 @@ impl Planner {
     }
 
     /// A move's feed; one that a factor has made faster than the motors can follow is slowed down to what they can.
-    pub(super) fn feed(
-        &mut self,
-        wanted: MmPerS,
-        line: LineNumber,
-        to: Position,
-        source: &Source,
-    ) -> MmPerS {
+    pub(super) fn feed(&mut self, wanted: MmPerS, line: LineNumber, to: Position, source: &Source) -> MmPerS {
         if source.interpreter.speed_factor() <= 1.0 && source.interpreter.flow_factor() <= 1.0 {
             return wanted;
         }

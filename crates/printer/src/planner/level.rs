@@ -60,7 +60,11 @@ impl Planner {
         let begin = gcode::Position { x: from[0], y: from[1], z: from[2], e: e - source.e_offset };
         let [was, is] = [mv.from, mv.to].map(|at| [at.x, at.y, at.z]);
         if was == is {
-            self.guard.judge_extrusion(&Move { from: begin, to: gcode::Position { e: mv.to.e, ..begin }, ..*mv })?;
+            self.guard.judge_extrusion(&Move {
+                from: begin,
+                to: gcode::Position { e: mv.to.e, ..begin },
+                ..*mv
+            })?;
             let piece = Piece { to: [x, y, z, to_e], feed: mv.feed, line: mv.line };
             return self.push_piece(&piece, source);
         }

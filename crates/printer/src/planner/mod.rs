@@ -12,6 +12,8 @@ mod guard;
 mod item;
 mod judge;
 mod level;
+#[cfg(test)]
+mod level_tests;
 mod paces;
 mod report;
 mod skip;

@@ -123,7 +123,10 @@ impl Source {
 
     /// Whether everything that was fed has been read.
     pub fn is_drained(&self) -> bool {
-        self.lines.buffered() == 0 && self.next_action >= self.actions.len() && self.chords.is_none() && self.pieces.is_none()
+        self.lines.buffered() == 0
+            && self.next_action >= self.actions.len()
+            && self.chords.is_none()
+            && self.pieces.is_none()
     }
 
     /// Says that no more bytes come: a last line without a line break counts.

@@ -34,7 +34,9 @@ pub enum MeshError {
         distance: f64,
     },
     /// It leads to a height that the bed has not.
-    #[error("fade_target {target:.3} mm is not between {low:.3} and {high:.3} mm, which the mesh has; 0 is allowed")]
+    #[error(
+        "fade_target {target:.3} mm is not between {low:.3} and {high:.3} mm, which the mesh has; 0 is allowed"
+    )]
     TargetOutside {
         /// Where it leads.
         target: f64,

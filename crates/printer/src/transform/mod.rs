@@ -94,7 +94,8 @@ impl Transform {
             SkewChange::Clear => self.skew = Skew::default(),
             SkewChange::Load(name) => {
                 let skew = profiles.skews.get(name);
-                self.skew = *skew.ok_or_else(|| format!("the machine file has no [skew_correction {name}]"))?;
+                self.skew =
+                    *skew.ok_or_else(|| format!("the machine file has no [skew_correction {name}]"))?;
             }
             SkewChange::Measured { xy, xz, yz } => {
                 let factor = |lengths: &Option<[f64; 3]>, now: f64| match lengths {

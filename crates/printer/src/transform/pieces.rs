@@ -88,7 +88,8 @@ impl Pieces {
         let (way, here) = (to - from, from + (to - from) * self.at);
         let ahead = |height: f64| (height - here) * way.signum() > FADE_MISSED_MM;
         let share = |height: f64| (height - from) / way;
-        let found = [fade.start, fade.end].into_iter().filter(|&height| way != 0.0 && ahead(height)).map(share);
+        let found =
+            [fade.start, fade.end].into_iter().filter(|&height| way != 0.0 && ahead(height)).map(share);
         found.fold(1.0, f64::min)
     }
 
@@ -136,7 +137,8 @@ impl Pieces {
         let heights = [at, until.min(limit)].map(|at| self.flat[0][2] + rise * at);
         let shares = heights.map(|height| mesh.share(height));
         let lost = shares[0] - shares[1];
-        let steepest = if lost == 0.0 { 0.0 } else { mesh.fade().map_or(0.0, |it| 1.0 / (it.end - it.start)) };
+        let steepest =
+            if lost == 0.0 { 0.0 } else { mesh.fade().map_or(0.0, |it| 1.0 / (it.end - it.start)) };
         let bend = shares[0].max(shares[1]) * cell.curvature * length * length
             + 2.0 * steepest * rise.abs() * cell.slope * length;
         Stretch { until, is_edge, bend }

@@ -100,8 +100,7 @@ impl GridAxis {
         weights.count = SPLINE_POINTS.min(self.count - weights.begin);
         weights.add(interval, sum(2.0, -3.0, 0.0, 1.0));
         weights.add(interval + 1, sum(-2.0, 3.0, 0.0, 0.0));
-        for (point, shape) in
-            [(interval, sum(1.0, -2.0, 1.0, 0.0)), (interval + 1, sum(1.0, -1.0, 0.0, 0.0))]
+        for (point, shape) in [(interval, sum(1.0, -2.0, 1.0, 0.0)), (interval + 1, sum(1.0, -1.0, 0.0, 0.0))]
         {
             // At an end, the point that is missing is taken to lie straight on.
             let (before, after, share) = match point {
@@ -144,9 +143,7 @@ impl Jet {
         Self {
             value: self.value * other.value,
             first: self.first * other.value + self.value * other.first,
-            second: self.second * other.value
-                + 2.0 * self.first * other.first
-                + self.value * other.second,
+            second: self.second * other.value + 2.0 * self.first * other.first + self.value * other.second,
         }
     }
 }
@@ -280,7 +277,8 @@ impl Surface {
         let [x, y] = [self.axes[0].weights(x, None), self.axes[1].weights(y, None)];
         let mut height = 0.0;
         for (row, y) in y.iter() {
-            let points = x.iter().map(|(column, x)| self.heights[row * self.axes[0].count + column] * x.value);
+            let points =
+                x.iter().map(|(column, x)| self.heights[row * self.axes[0].count + column] * x.value);
             height += y.value * points.sum::<f64>();
         }
         height

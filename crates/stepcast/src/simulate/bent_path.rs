@@ -67,7 +67,10 @@ impl BentMove {
             off_mm = (0..3).map(off).fold(off_mm, f64::max);
         }
         if off_mm > Z_ERROR_MAX_MM {
-            anyhow::bail!("a piece of line {line}, to {}, is {off_mm:.5} mm off the bed's surface", place(to));
+            anyhow::bail!(
+                "a piece of line {line}, to {}, is {off_mm:.5} mm off the bed's surface",
+                place(to)
+            );
         }
         self.share = share;
         Ok(Piece { line, from: begin, to: end, bulge_mm: self.piece.bulge_mm + off_mm })
