@@ -84,9 +84,9 @@ impl BentMove {
         let [x, y, z, _] = machine;
         let at = transform.gcode_from_machine([x, y, z]);
         let (mut along, mut length) = (0.0, 0.0);
-        for axis in 0..3 {
-            let way = self.piece.to[axis] - self.piece.from[axis];
-            along += (at[axis] - self.piece.from[axis]) * way;
+        for ((at, from), to) in at.into_iter().zip(self.piece.from).zip(self.piece.to) {
+            let way = to - from;
+            along += (at - from) * way;
             length += way * way;
         }
         if length > 0.0 { along / length } else { 1.0 }

@@ -384,12 +384,13 @@ impl Ready {
             TimedAction::ReportTemperatures => self.events.push(Event::Message(self.thermal.describe())),
             TimedAction::ReportPosition => {
                 let [x, y, z, e] = self.planner.gcode_position();
-                let mut text = format!("X:{x:.3} Y:{y:.3} Z:{z:.3} E:{e:.3}");
-                if !self.planner.transform().is_identity() {
-                    let [x, y, z, _] = self.planner.position();
-                    text.push_str(&format!(" (motors X:{x:.3} Y:{y:.3} Z:{z:.3})"));
-                }
-                self.events.push(Event::Message(text));
+                let text = format!("X:{x:.3} Y:{y:.3} Z:{z:.3} E:{e:.3}");
+                let [x, y, z, _] = self.planner.position();
+                self.events.push(Event::Message(if self.planner.transform().is_identity() {
+                    text
+                } else {
+                    format!("{text} (motors X:{x:.3} Y:{y:.3} Z:{z:.3})")
+                }));
             }
         }
     }
