@@ -6,8 +6,8 @@
 //! costs no more memory than one with a thousand.
 
 use gcode::{
-    Action, CHORD_TOLERANCE, Diagnostic, Heater, Interpreter, LineNumber, Lines, Move, Settings, Severity,
-    VelocityLimit,
+    Action, Arc, CHORD_TOLERANCE, Diagnostic, Heater, Interpreter, LineNumber, Lines, Move, Settings,
+    Severity, VelocityLimit,
 };
 use motion::Limits;
 use units::Celsius;
@@ -224,7 +224,7 @@ impl Checker {
     fn act(&mut self, action: &Action, line: LineNumber) {
         match *action {
             Action::Move(ref mv) => self.judge(mv),
-            Action::Arc(ref arc) => arc.chords(CHORD_TOLERANCE).for_each(|chord| self.judge(&chord)),
+            Action::Arc(ref arc) => self.judge_arc(arc),
             Action::Home { x, y, z } => self.home([x, y, z]),
             Action::SetTemperature { heater, target, .. } => self.target(heater, target, line),
             Action::WaitForTemperature { heater, .. } => _ = self.limits_of(heater, line),
@@ -274,6 +274,18 @@ impl Checker {
         if let Err(error) = allowed.and(possible) {
             self.keep(error);
         }
+    }
+
+    /// An arc may lead out of the machine between two places that are in it.
+    fn judge_arc(&mut self, arc: &Arc) {
+        if let Some(guard) = &self.guard {
+            let place = |at: gcode::Position| self.transform.machine_from_gcode([at.x, at.y, at.z]);
+            let reach = |to: gcode::Position| guard.judge_travel(place(arc.from), place(to), arc.line);
+            if let Err(error) = arc.extremes().try_for_each(reach) {
+                self.keep(error);
+            }
+        }
+        arc.chords(CHORD_TOLERANCE).for_each(|chord| self.judge(&chord));
     }
 
     fn home(&mut self, axes: [bool; 3]) {

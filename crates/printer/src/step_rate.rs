@@ -129,11 +129,11 @@ impl StepRates {
     /// Refuses a planned move in which a motor would have to step faster than it can.
     /// Where it draws, pressure advance adds to the filament's speed.
     pub fn judge_planned(&self, planned: &PlannedMove) -> Result<(), PrinterError> {
-        let draws =
-            planned.direction[EXTRUDER] > 0.0 && (planned.direction[0] != 0.0 || planned.direction[1] != 0.0);
-        for motor in 0..MOTORS {
+        let draws = planned.direction[EXTRUDER] > 0.0
+            && (planned.bend.is_some() || planned.direction[0] != 0.0 || planned.direction[1] != 0.0);
+        for (motor, share) in planned.directions().flat_map(|direction| direction.into_iter().enumerate()) {
             let added = if draws && motor == EXTRUDER { self.added(planned) } else { 0.0 };
-            let speed = MmPerS((planned.cruise_velocity + added) * planned.direction[motor].abs());
+            let speed = MmPerS((planned.cruise_velocity + added) * share.abs());
             if speed > self.speed_max[motor] * (1.0 + SLACK) {
                 return Err(too_fast(motor, speed, planned.tag));
             }

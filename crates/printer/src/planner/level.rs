@@ -115,7 +115,7 @@ impl Planner {
     fn push_judged(&mut self, to: Position, piece: &Piece, source: &Source) -> Result<(), PrinterError> {
         let feed = self.feed(piece.feed, piece.line, to, source);
         self.judge_torque(to, feed, piece.line)?;
-        self.push(to, feed, piece.line, source.pace())
+        self.push(to, None, feed, piece.line, source.pace())
     }
 }
 

@@ -73,7 +73,7 @@ impl BentMove {
             );
         }
         self.share = share;
-        Ok(Piece { line, from: begin, to: end, bulge_mm: self.piece.bulge_mm + off_mm })
+        Ok(Piece { line, from: begin, to: end, arc: None })
     }
 
     /// How much of the move has been made at a place of the machine.

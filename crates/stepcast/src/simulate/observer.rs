@@ -14,6 +14,7 @@ use units::{Seconds, Ticks};
 use virtual_printer::VirtualPrinter;
 
 use super::{
+    arc_way::ArcWay,
     gcode_path::{GcodePath, Piece},
     path_check::Span,
     report::Homing,
@@ -237,11 +238,7 @@ impl Observer {
                 tally.path.set_position(EXTRUDER, from[EXTRUDER]);
             }
         }
-        if self.aside.is_none() {
-            self.plan_steps(scheduled);
-            self.end = Some(to);
-        }
-        let mut piece = Piece { line, from, to, bulge_mm: 0.0 };
+        let mut piece = Piece { line, from, to, arc: None };
         if !homing {
             self.moves += 1;
             if line > 0 && self.mismatch.is_none() {
@@ -249,14 +246,17 @@ impl Observer {
                     Ok(found) => {
                         piece.from[..EXTRUDER].copy_from_slice(&found.from[..EXTRUDER]);
                         piece.to[..EXTRUDER].copy_from_slice(&found.to[..EXTRUDER]);
-                        piece.bulge_mm = found.bulge_mm;
+                        piece.arc = found.arc;
                     }
                     Err(error) => self.mismatch = Some(format!("{error:#}")),
                 }
             }
         }
-        let span =
-            Span { line, start, end, from: piece.from, to: piece.to, bulge_mm: piece.bulge_mm, homing };
+        if self.aside.is_none() {
+            self.plan_steps(scheduled, piece.arc.as_ref());
+            self.end = Some(to);
+        }
+        let span = Span { line, start, end, from: piece.from, to: piece.to, arc: piece.arc, homing };
         if tally.path.expect(&span).is_err() {
             self.mismatch
                 .get_or_insert_with(|| format!("line {line} was planned too far ahead to be followed"));
@@ -309,14 +309,17 @@ impl Observer {
 
     /// Counts the steps of a move: those where it crosses half-way between two positions of a motor. An approach to an
     /// endstop counts by what was made of it, which comes with [`Event::Homed`].
-    fn plan_steps(&mut self, scheduled: &ScheduledMove) {
+    fn plan_steps(&mut self, scheduled: &ScheduledMove, arc: Option<&ArcWay>) {
         for motor in 0..MOTORS {
             let (from, to) = (scheduled.from[motor], scheduled.to[motor]);
             let approach = scheduled.homing
                 && self.endstop_mm.get(motor).is_some_and(|&endstop| to == endstop && from != endstop);
             if !approach {
                 let distance = self.step_distance_mm[motor];
-                self.planned[motor] += grid(to, distance).abs_diff(grid(from, distance));
+                let turn = arc.filter(|_| motor < EXTRUDER).and_then(|arc| arc.turning_point(motor));
+                let turn = grid(turn.unwrap_or(from), distance);
+                self.planned[motor] +=
+                    turn.abs_diff(grid(from, distance)) + grid(to, distance).abs_diff(turn);
             }
         }
     }
