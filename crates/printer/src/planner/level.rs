@@ -5,7 +5,7 @@
 
 use gcode::{Action, LineNumber, Move};
 
-use super::{Planner, Position, Source, source::Piece};
+use super::{Planner, Position, Said, Source, source::Piece};
 use crate::{
     error::{ErrorCode, PrinterError},
     transform::{Pieces, Transform, TransformRecord},
@@ -21,6 +21,22 @@ impl Planner {
         let [x, y, z, e] = self.position;
         let [x, y, z] = self.transform.gcode_from_machine([x, y, z]);
         [x, y, z, e]
+    }
+
+    /// Makes a source continue from where the machine is: before its first line, and whenever another source moved. Its
+    /// offsets are forgotten.
+    pub fn adopt(&mut self, source: &mut Source) {
+        let [x, y, z, e] = self.gcode_position();
+        source.interpreter.set_axes(Some(x), Some(y), Some(z));
+        source.e_offset = e - source.interpreter.position().e;
+        self.said = Said::default();
+    }
+
+    /// Tells a source whose move was refused, or stopped, that the machine stands here. Its offsets hold.
+    pub fn correct(&mut self, source: &mut Source) {
+        let [x, y, z, e] = self.gcode_position();
+        source.interpreter.stand_at(x, y, z);
+        source.e_offset = e - source.interpreter.position().e;
     }
 
     /// What makes up for skew and bed in the moves that are read from now on.

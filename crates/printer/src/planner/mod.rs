@@ -213,22 +213,6 @@ impl Planner {
         self.position = position;
     }
 
-    /// Makes a source continue from where the machine is: before its first line, and whenever another source moved. Its
-    /// offsets are forgotten.
-    pub fn adopt(&mut self, source: &mut Source) {
-        let [x, y, z, e] = self.gcode_position();
-        source.interpreter.set_axes(Some(x), Some(y), Some(z));
-        source.e_offset = e - source.interpreter.position().e;
-        self.said = Said::default();
-    }
-
-    /// Tells a source whose move was refused, or stopped, that the machine stands here. Its offsets hold.
-    pub fn correct(&mut self, source: &mut Source) {
-        let [x, y, z, e] = self.gcode_position();
-        source.interpreter.stand_at(x, y, z);
-        source.e_offset = e - source.interpreter.position().e;
-    }
-
     /// As [`Self::adopt`], for a job, whose plan is to depend on nothing that was done before: the machine file's limits
     /// hold again, and the filament counts from 0. What makes up for skew and bed stays in force. At rest.
     pub fn begin_job(&mut self, source: &mut Source) {
