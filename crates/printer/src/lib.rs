@@ -21,3 +21,4 @@ pub mod preview;
 pub mod session;
 pub mod step_rate;
 pub mod thermistor;
+pub mod transform;

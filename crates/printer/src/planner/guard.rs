@@ -3,7 +3,7 @@
 //! Knows positions and limits, not speeds (the look-ahead keeps those) and not temperatures (it is told whether the
 //! nozzle may extrude). Positions are machine coordinates in mm, the extruder in mm of filament.
 
-use gcode::Move;
+use gcode::{LineNumber, Move};
 
 use crate::{
     config::PrinterConfig,
@@ -75,27 +75,38 @@ impl Guard {
 
     /// Why this move may not be made, if so.
     pub fn judge(&self, mv: &Move) -> Result<(), PrinterError> {
-        let from = [mv.from.x, mv.from.y, mv.from.z];
-        let to = [mv.to.x, mv.to.y, mv.to.z];
+        let [from, to] = [mv.from, mv.to].map(|at| [at.x, at.y, at.z]);
+        self.judge_travel(from, to, mv.line)?;
+        self.judge_extrusion(mv)
+    }
+
+    /// Why the head may not go there, if so.
+    pub(crate) fn judge_travel(
+        &self,
+        from: [f64; 3],
+        to: [f64; 3],
+        line: LineNumber,
+    ) -> Result<(), PrinterError> {
         for axis in 0..3 {
             if from[axis] == to[axis] {
                 continue;
             }
             if !self.homed[axis] {
                 let detail = format!("axis {} has not been homed", AXES[axis]);
-                return Err(PrinterError::new(ErrorCode::NotHomed, detail).at_line(mv.line.0));
+                return Err(PrinterError::new(ErrorCode::NotHomed, detail).at_line(line.0));
             }
             let (min, max) = self.limits_mm[axis];
             if !(min - LIMIT_SLACK_MM..=max + LIMIT_SLACK_MM).contains(&to[axis]) {
                 let detail =
                     format!("{} {:.3} mm lies outside {min:.3} to {max:.3} mm", AXES[axis], to[axis]);
-                return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(mv.line.0));
+                return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(line.0));
             }
         }
-        self.judge_extrusion(mv)
+        Ok(())
     }
 
-    fn judge_extrusion(&self, mv: &Move) -> Result<(), PrinterError> {
+    /// Why it may not push so much filament, if so.
+    pub(crate) fn judge_extrusion(&self, mv: &Move) -> Result<(), PrinterError> {
         let filament = mv.to.e - mv.from.e;
         if filament == 0.0 {
             return Ok(());

@@ -110,7 +110,11 @@ impl Observer {
         Self {
             step_distance_mm: printer::machine::step_distances(config).map(|distance| distance.0),
             endstop_mm: config.steppers.each_ref().map(|axis| axis.position_endstop.0),
-            gcode: GcodePath::new(reference, printer::machine::gcode_settings(config)),
+            gcode: GcodePath::new(
+                reference,
+                printer::machine::gcode_settings(config),
+                std::sync::Arc::clone(&config.profiles),
+            ),
             planned: [0; MOTORS],
             filtered: filtered(config),
             end: None,
