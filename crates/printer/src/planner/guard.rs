@@ -124,17 +124,19 @@ impl Guard {
         }
         let travel = [mv.to.x - mv.from.x, mv.to.y - mv.from.y, mv.to.z - mv.from.z];
         let length = libm::sqrt(travel.iter().map(|d| d * d).sum());
-        if length == 0.0 {
+        // Filament that is pulled back while the head travels is not laid along the way either.
+        if length == 0.0 || filament < 0.0 {
             if filament.abs() > extruder.extrude_only_max_mm {
+                let how = if length == 0.0 { "without travel" } else { "pulled back" };
                 return fail(
                     ErrorCode::ExtrusionTooLong,
                     format!(
-                        "{filament:.1} mm of filament without travel, max_extrude_only_distance is {:.1} mm",
+                        "{filament:.1} mm of filament {how}, max_extrude_only_distance is {:.1} mm",
                         extruder.extrude_only_max_mm
                     ),
                 );
             }
-        } else if filament > 0.0 {
+        } else {
             let area = filament / length * extruder.filament_area_mm2;
             // Dabs shorter than a nozzle's bore are how slicers prime and wipe: their ratio means nothing.
             let dab = filament * extruder.filament_area_mm2 <= extruder.cross_section_max_mm2 * DAB_MM;
