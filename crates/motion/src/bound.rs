@@ -208,11 +208,14 @@ impl Bound {
             return 0.0;
         }
         let mut v2 = a.cruise_v2.min(b.cruise_v2);
-        if b.continues && a.bends && b.bends {
-            return v2;
-        }
         let (before, after) = (a.headings[1], b.headings[0]);
         let dot: f64 = (0..3).map(|axis| before[axis] * after[axis]).sum();
+        let jump = |axis: usize| (before[axis] - after[axis]).abs();
+        let speed = b.extruder_jump / jump(3);
+        v2 = v2.min(speed * speed);
+        if b.continues && a.bends && b.bends && dot > 0.99 {
+            return v2;
+        }
         // Half the angle between the two, a right angle where they go straight on.
         let half = 0.5 * (core::f64::consts::PI - libm::acos(dot.clamp(-1.0, 1.0)));
         let (sin, tan) = (libm::sin(half), libm::tan(half));
@@ -222,9 +225,6 @@ impl Bound {
             }
             v2 = v2.min(0.5 * way.whole * way.accel * tan);
         }
-        let jump = |axis: usize| (before[axis] - after[axis]).abs();
-        let speed = b.extruder_jump / jump(3);
-        v2 = v2.min(speed * speed);
         for (axis, motor) in self.motors.iter().enumerate() {
             let (Some(motor), true) = (motor, jump(axis) > 0.0) else { continue };
             let speed = motor.start().0 / jump(axis);

@@ -10,6 +10,8 @@ pub(crate) const LENGTH_MIN_MM: f64 = 1e-9;
 
 /// The place of the filament among the coordinates.
 const EXTRUDER: usize = 3;
+/// The cosine of the angle up to which pieces of one arc go on into each other.
+const SAME_HEADING: f64 = 0.99;
 
 /// A move that waits in the window: what limits it, in squared speeds (mm²/s²).
 #[derive(Clone, Copy, Debug)]
@@ -186,15 +188,16 @@ impl Entry {
             return 0.0;
         }
         let mut limit = self.cruise_limit.min(previous.cruise_limit);
-        // Within an arc there is no corner.
-        if self.bend.is_some_and(|bend| bend.continues) && previous.bend.is_some() {
-            return limit;
-        }
         let (before, after) = (previous.heading(true), self.heading(false));
         let extrusion_jump = (self.direction.w - previous.direction.w).abs();
         if extrusion_jump > 0.0 {
             let speed = self.corner_extruder / extrusion_jump;
             limit = limit.min(speed * speed);
+        }
+        // Within an arc there is no corner.
+        let continues = self.bend.is_some_and(|bend| bend.continues) && previous.bend.is_some();
+        if continues && after.dot(&before) > SAME_HEADING {
+            return limit;
         }
         // θ is the angle between the two moves, π where they go straight on.
         let cos_theta = -after.dot(&before);

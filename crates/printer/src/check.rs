@@ -9,10 +9,11 @@ use gcode::{
     Action, Arc, CHORD_TOLERANCE, Diagnostic, Heater, Interpreter, LineNumber, Lines, Move, Settings,
     Severity, VelocityLimit,
 };
-use motion::Limits;
+use motion::{Bend, Limits};
 use units::Celsius;
 
 use crate::{
+    arcs,
     config::{HeaterConfig, PrinterConfig},
     error::{ErrorCode, PrinterError},
     machine,
@@ -84,9 +85,10 @@ impl Speeds {
         }
     }
 
-    fn judge(&self, mv: &Move) -> Result<(), PrinterError> {
+    fn judge(&self, mv: &Move, bend: Option<&Bend>) -> Result<(), PrinterError> {
         let (from, to) = (mv.from.to_array(), mv.to.to_array());
-        self.step_rates.judge_request(from, to, mv.feed, &self.limits, mv.line)
+        arcs::straight_ends(from, to, bend)
+            .try_for_each(|end| self.step_rates.judge_request(from, end, mv.feed, &self.limits, mv.line))
     }
 }
 
@@ -223,7 +225,7 @@ impl Checker {
 
     fn act(&mut self, action: &Action, line: LineNumber) {
         match *action {
-            Action::Move(ref mv) => self.judge(mv),
+            Action::Move(ref mv) => self.judge(mv, None),
             Action::Arc(ref arc) => self.judge_arc(arc),
             Action::Home { x, y, z } => self.home([x, y, z]),
             Action::SetTemperature { heater, target, .. } => self.target(heater, target, line),
@@ -255,7 +257,7 @@ impl Checker {
         }
     }
 
-    fn judge(&mut self, mv: &Move) {
+    fn judge(&mut self, mv: &Move, bend: Option<&Bend>) {
         self.report.moves += 1;
         let filament = mv.to.e - mv.from.e;
         self.report.filament_mm += filament;
@@ -270,7 +272,7 @@ impl Checker {
             }
         }
         let allowed = self.guard.as_ref().map_or(Ok(()), |guard| judge(guard, &self.transform, mv));
-        let possible = self.speeds.as_ref().map_or(Ok(()), |speeds| speeds.judge(mv));
+        let possible = self.speeds.as_ref().map_or(Ok(()), |speeds| speeds.judge(mv, bend));
         if let Err(error) = allowed.and(possible) {
             self.keep(error);
         }
@@ -285,7 +287,12 @@ impl Checker {
                 self.keep(error);
             }
         }
-        arc.chords(CHORD_TOLERANCE).for_each(|chord| self.judge(&chord));
+        let mut chords = arc.chords(CHORD_TOLERANCE);
+        while let Some(piece) = chords.next_piece() {
+            let bend = arcs::bend(&piece);
+            let fits = bend.fits(&piece.chord.from.to_array(), &piece.chord.to.to_array());
+            self.judge(&piece.chord, (fits && self.transform.is_identity()).then_some(&bend));
+        }
     }
 
     fn home(&mut self, axes: [bool; 3]) {

@@ -78,8 +78,15 @@ fn parts(phase: &Phase, bend: &Bend, per_mm: f64) -> f64 {
     if parts > 1.0 { parts.min(PARTS_MAX) } else { 1.0 }
 }
 
+/// Shorter phases are the dust of rounding, in s: the way they make is, too, and says nothing of a speed.
+const DUST_S: f64 = 1e-9;
+
 /// The cubic between two positions with two velocities.
 fn hermite(start_time: f64, duration: f64, [start, end]: [f64; 2], [begins, arrives]: [f64; 2]) -> Segment {
+    if duration < DUST_S {
+        let powers = [0.5 * (begins + arrives), 0.0, 0.0, 0.0, 0.0];
+        return Segment { start_time, duration, start, end, powers };
+    }
     let mean = (end - start) / duration;
     let bend = (3.0 * mean - 2.0 * begins - arrives) / duration;
     let twist = (begins + arrives - 2.0 * mean) / (duration * duration);

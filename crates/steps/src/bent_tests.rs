@@ -148,6 +148,30 @@ proptest! {
     }
 }
 
+/// A ramp shorter than the digits of its own way makes no speed up.
+#[test]
+fn a_ramp_of_dust_has_the_speed_of_its_ends() {
+    let arc = Arc {
+        normal: 2,
+        centre: [171.870_566_014_983_9, 225.223_890_785_962_45],
+        radius: 5.151_659_991_966_331,
+        angle: -0.710_573_319_240_453_1,
+        turn: 0.084_455_398_078_084_79,
+        rise: 0.0,
+        filament: 0.0,
+    };
+    let mut planned = arc.plan(limits(), Profile::default(), 20.0, 1.0, Seconds(0.0));
+    let one = &mut planned[0];
+    one.decel_time = 1.7e-18;
+    one.end_velocity = one.cruise_velocity;
+    for axis in 0..2 {
+        let turning = turning_axis(one, axis).unwrap();
+        bent_segments(one, turning, [one.from[axis], one.to[axis]], &mut |segment| {
+            assert!(segment.powers[0].abs() < 20.1, "{segment:?}");
+        });
+    }
+}
+
 /// Each step of each motor: at its time the exact path is half-way between two steps, but for the time's own error.
 fn check_pulses(arc: &Arc, planned: &[PlannedMove]) -> Result<(), TestCaseError> {
     let commands = commands(&mut generator(CLOCK), planned, false);

@@ -153,6 +153,18 @@ fn a_trace_is_the_path_over_all_of_the_print_time() {
     }
 }
 
+#[test]
+fn a_short_dwell_counts_for_the_layer_in_which_it_is() {
+    let text = "G28\nM83\n;LAYER:0\nG1 Z0.2 F600\nG1 X50 E1 F3000\nG4 P500\nG1 X10 E1\n;LAYER:1\nG1 Z0.4\nG1 X50 E1\n\
+        G1 X10 E1\n;LAYER:2\nG1 Z0.6\nG1 X50 E1\nG1 X10 E1\n";
+    let (report, _) = plan(&machine(), text, None);
+    let times: Vec<f64> = report.layers.iter().map(|layer| layer.total.time.0).collect();
+    let [first, second, third] = times[..] else { panic!("{times:?}") };
+    assert!(first > second + 0.45 && (second - third).abs() < 0.2, "{times:?}");
+    assert!((time_of(&report, "pause") - 0.5).abs() < 1e-9);
+    assert!((first + second + third - report.print_time.0).abs() < 1e-9);
+}
+
 /// One word's halves.
 fn halves(word: u32) -> [f64; 2] {
     [word & 0xffff, word >> 16].map(f64::from)

@@ -147,8 +147,8 @@ pub struct PlanStream {
     sequence: u8,
     report: PlanReport,
     estimates: Estimates,
-    /// How long the moves of the present run have taken.
-    moved: Seconds,
+    /// Up to here the present run's time has been given to a layer.
+    accounted: Seconds,
     /// Waits of the file outside of any run of motion.
     dwelt: Seconds,
 }
@@ -190,7 +190,7 @@ impl PlanStream {
             sequence: 0,
             report: PlanReport::default(),
             estimates: Estimates::new(machine::filament_area_mm2(config)),
-            moved: Seconds::ZERO,
+            accounted: Seconds::ZERO,
             dwelt: Seconds::ZERO,
         })
     }
@@ -261,20 +261,21 @@ impl PlanStream {
                 Planned::Move(planned, _) => {
                     self.report.moves += 1;
                     self.report.filament_mm += planned.to[EXTRUDER] - planned.from[EXTRUDER];
-                    self.moved += Seconds(planned.duration());
+                    self.account(Seconds(planned.start_time));
+                    self.accounted = Seconds(planned.end_time());
                     sink.mv(&planned, &self.estimates.take(&planned));
                     self.sample(sink);
                 }
                 Planned::Steps(command) => self.pack(&command, blocks),
                 Planned::RunStarted(position) => {
-                    self.moved = Seconds::ZERO;
+                    self.accounted = Seconds::ZERO;
                     self.planner.trace.iter_mut().for_each(|trace| trace.begin_run(position));
                     for motor in 0..MOTORS {
                         self.pack_message(&Command::ResetStepClock { oid: motor as u8, clock: 0 }, blocks);
                     }
                 }
                 Planned::RunEnded(at) => {
-                    self.estimates.pause(Seconds((at.0 - self.moved.0).max(0.0)));
+                    self.account(at);
                     self.rest(at, sink);
                 }
                 Planned::Barrier { barrier: Barrier::Dwell(duration), .. } => {
@@ -289,6 +290,11 @@ impl PlanStream {
                 Planned::Timed { .. } | Planned::Notice(_) => {}
             }
         }
+    }
+
+    /// Up to this time of the run nothing moves.
+    fn account(&mut self, until: Seconds) {
+        self.estimates.pause((until - self.accounted).max(Seconds::ZERO));
     }
 
     /// A run or a rest has ended after this time.

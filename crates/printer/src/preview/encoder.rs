@@ -70,6 +70,11 @@ const fn place(position: gcode::Position) -> [f64; 3] {
     [position.x, position.y, position.z]
 }
 
+/// Whether a move leads nowhere.
+pub(super) fn is_on_the_spot(mv: &Move) -> bool {
+    distance(place(mv.from), place(mv.to)) < SAME_PLACE_MM
+}
+
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     let [x, y, z] = [0, 1, 2].map(|axis| a[axis] - b[axis]);
     libm::sqrt(x * x + y * y + z * z)

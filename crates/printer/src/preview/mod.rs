@@ -223,7 +223,7 @@ impl Preview {
         let before = self.encoder.count;
         let segment = self.encoder.mv(mv, out);
         // The last of the vertices that it has made is its end; on the spot it makes none of its own.
-        let has_end = self.encoder.count > before && mv.from.to_array()[..3] != mv.to.to_array()[..3];
+        let has_end = self.encoder.count > before && !encoder::is_on_the_spot(mv);
         let vertex = has_end.then(|| self.encoder.count - 1);
         if let Some(estimate) = &mut self.estimate {
             estimate.mv(&Asking { mv, bend, segment, layer: self.encoder.layers.number(), vertex });
