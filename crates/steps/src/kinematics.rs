@@ -94,8 +94,8 @@ impl Geometry {
         for _ in 0..AXES {
             let motors: [bool; AXES] =
                 core::array::from_fn(|motor| (0..AXES).any(|axis| all[axis] && self.axes(motor)[axis]));
-            for axis in 0..AXES {
-                all[axis] |= (0..AXES).any(|motor| motors[motor] && self.axes(motor)[axis]);
+            for (axis, is_in) in all.iter_mut().enumerate() {
+                *is_in |= (0..AXES).any(|motor| motors[motor] && self.axes(motor)[axis]);
             }
         }
         all

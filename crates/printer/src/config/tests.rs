@@ -86,7 +86,7 @@ fn every_wrong_value_is_an_error_on_its_line() {
         ("max_velocity: 300", "max_velocity: nan", "max_velocity: nan", "must be above 0"),
         ("max_velocity: 300", "max_velocity: 1e300", "1e300", "must be above 0 and at most 10000"),
         ("max_velocity: 300", "max_velocity:", "max_velocity:", "it has no value"),
-        ("kinematics: cartesian", "kinematics: delta", "delta", "only `cartesian` machines"),
+        ("kinematics: cartesian", "kinematics: polar", "polar", "there are cartesian, corexy,"),
         ("step_pin: gpio2", "step_pin: ^gpio2", "^gpio2", "an output has no pull-up"),
         ("step_pin: gpio2", "step_pin: probe:x", "probe:x", "only pins of the main board"),
         ("rotation_distance: 40", "rotation_distance: 0", "rotation_distance: 0", "must be above 0"),

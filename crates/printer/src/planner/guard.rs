@@ -8,13 +8,8 @@ use gcode::Move;
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
+    reach::{AXES, Reach},
 };
-
-/// Names of the axes in messages.
-const AXES: [&str; 3] = ["X", "Y", "Z"];
-
-/// How far beyond a limit still counts as on it, in mm: the dust of decimal arithmetic, far below a step.
-const LIMIT_SLACK_MM: f64 = 1e-6;
 
 /// Whether the nozzle may push filament.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +26,7 @@ pub enum ExtrusionPermit {
 /// Judges moves before they are planned.
 #[derive(Clone, Debug)]
 pub struct Guard {
-    limits_mm: [(f64, f64); 3],
+    reach: Reach,
     homed: [bool; 3],
     extruder: Option<ExtruderGuard>,
     /// Kept up to date by the owner.
@@ -49,7 +44,6 @@ struct ExtruderGuard {
 impl Guard {
     /// The limits of a machine file; no axis is homed yet.
     pub fn new(config: &PrinterConfig) -> Self {
-        let limits_mm = config.steppers.each_ref().map(|axis| (axis.position_min.0, axis.position_max.0));
         let extruder = config.extruder.as_ref().map(|extruder| ExtruderGuard {
             filament_area_mm2: extruder.filament_area_mm2(),
             cross_section_max_mm2: extruder.max_extrude_cross_section,
@@ -60,7 +54,7 @@ impl Guard {
             extruder.as_ref().is_none_or(|extruder: &ExtruderGuard| extruder.min_extrude_celsius <= 0.0);
         let extrusion =
             if cold_allowed { ExtrusionPermit::Allowed } else { ExtrusionPermit::TooCold { celsius: 0.0 } };
-        Self { limits_mm, homed: [false; 3], extruder, extrusion }
+        Self { reach: Reach::new(config), homed: [false; 3], extruder, extrusion }
     }
 
     /// Which axes have a known position.
@@ -77,6 +71,7 @@ impl Guard {
     pub fn judge(&self, mv: &Move) -> Result<(), PrinterError> {
         let from = [mv.from.x, mv.from.y, mv.from.z];
         let to = [mv.to.x, mv.to.y, mv.to.z];
+        let out_of_range = |detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(mv.line.0);
         for axis in 0..3 {
             if from[axis] == to[axis] {
                 continue;
@@ -85,12 +80,10 @@ impl Guard {
                 let detail = format!("axis {} has not been homed", AXES[axis]);
                 return Err(PrinterError::new(ErrorCode::NotHomed, detail).at_line(mv.line.0));
             }
-            let (min, max) = self.limits_mm[axis];
-            if !(min - LIMIT_SLACK_MM..=max + LIMIT_SLACK_MM).contains(&to[axis]) {
-                let detail =
-                    format!("{} {:.3} mm lies outside {min:.3} to {max:.3} mm", AXES[axis], to[axis]);
-                return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(mv.line.0));
-            }
+            self.reach.judge_axis(axis, to[axis]).map_err(out_of_range)?;
+        }
+        if from != to {
+            self.reach.judge_way(from, to).map_err(out_of_range)?;
         }
         self.judge_extrusion(mv)
     }

@@ -73,8 +73,8 @@ fn follows(geometry: &Geometry, motor: usize, stretch: &[Segment; AXES], error: 
 }
 
 /// Every motor ends where its moves do, and each step comes when the motor's exact path is half-way.
-fn steps_as_exact(geometry: Geometry, points: &[([f64; 4], f64)], filters: &Filters) {
-    let mut generator = generator(geometry, filters, &NONE);
+fn steps_as_exact(geometry: &Geometry, points: &[([f64; 4], f64)], filters: &Filters) {
+    let mut generator = generator(*geometry, filters, &NONE);
     let planned = plan(points[0].0, &points[1..], generator.lead());
     let late = commands(&mut generator, &planned, false);
     assert_eq!(late, commands(&mut generator, &planned, true));
@@ -150,8 +150,10 @@ proptest! {
             let bend = if axis == 2 { 0.0 } else { bend };
             let powers = [1.0, 3.0 * way + bend, -2.0 * way - 2.0 * bend, bend - 1.0, 0.0];
             let mut segment = Segment { start_time: 1.0, duration, start: from[axis], end: 0.0, powers };
-            for (power, scale) in segment.powers.iter_mut().zip(1..) {
-                *power /= duration.powi(scale);
+            let mut scale = 1.0;
+            for power in &mut segment.powers {
+                scale *= duration;
+                *power /= scale;
             }
             Segment { end: segment.start + segment.way(duration), ..segment }
         };
@@ -186,7 +188,7 @@ proptest! {
     ) {
         let points: Vec<_> = places.iter().map(|&([x, y, z], e, feed)| ([x, y, z, e], feed)).collect();
         let filters = if filtered { all_filters() } else { Filters::default() };
-        for geometry in [core_xy(), hybrid_core_xz(), Geometry::Delta(uneven())] {
+        for geometry in &[core_xy(), hybrid_core_xz(), Geometry::Delta(uneven())] {
             steps_as_exact(geometry, &points, &filters);
         }
     }

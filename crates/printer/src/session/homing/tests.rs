@@ -18,7 +18,7 @@ impl Table {
         let text = text.replacen("homing_retract_dist: 5", &format!("homing_retract_dist: {retract}"), 1);
         let config = config::parse(&text).0.expect("a machine");
         let board = Board::for_tests(&config);
-        let homing = AxisHoming::new(0, &config.steppers[0], &board).expect("an axis");
+        let homing = AxisHoming::new(0, &config, &board).expect("an axis");
         Self { board, homing, now: Seconds::ZERO }
     }
 
@@ -28,7 +28,7 @@ impl Table {
 
     fn position(&mut self, steps: i32) -> Result<(), PrinterError> {
         assert_eq!(self.poll(true), Ok(Wish::Wait));
-        self.homing.on_position(self.homing.stepper, steps, self.now)
+        self.homing.on_position(self.homing.movers[0].oid, steps, self.now)
     }
 
     fn trigger(&mut self, can_trigger: bool, reason: u8) -> Result<(), PrinterError> {
@@ -100,7 +100,7 @@ fn it_comes_twice_the_second_time_from_near_and_slowly() {
     assert_eq!((second.from_mm, second.to_mm, second.speed.0), (10.0, 0.0, 10.0));
     table.found(-3101).unwrap();
     assert_eq!(table.poll(true), Ok(Wish::Done));
-    assert_eq!((table.homing.steps, table.homing.position_mm()), (3200 + 401, 0.0));
+    assert_eq!((table.homing.steps()[0], table.homing.position_mm()), (3200 + 401, 0.0));
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn an_approach_that_the_time_out_ends_goes_on_from_there() {
     assert_eq!((slow.from_mm, slow.to_mm, slow.speed.0), (7.0, 0.0, 10.0));
     // The switch is closed without a further step, but there were some.
     table.found(-3740).unwrap();
-    assert_eq!((table.poll(true), table.homing.steps), (Ok(Wish::Done), 4000 + 240));
+    assert_eq!((table.poll(true), table.homing.steps()[0]), (Ok(Wish::Done), 4000 + 240));
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn answers_for_others_and_at_other_times_change_nothing() {
     table.homing.on_trigger(77, false, REASON_ENDSTOP, table.now, &mut table.board).unwrap();
     table.homing.on_endstop(77, false, true, table.now, &mut table.board).unwrap();
     table.homing.on_position(77, 5, table.now).unwrap();
-    table.homing.on_position(table.homing.stepper, 5, table.now).unwrap();
+    table.homing.on_position(table.homing.movers[0].oid, 5, table.now).unwrap();
     assert!(matches!(table.homing.stage, Stage::Approach { .. }));
 }
 

@@ -14,6 +14,7 @@ use crate::{
     journal::Input,
     machine::EXTRUDER,
     planner::{ExtrusionPermit, Planner, Skip, Skipped},
+    reach::Reach,
     session::{
         event::Event,
         job::{Job, JobState, Paused, RETURN_FEED, Start, Way},
@@ -176,6 +177,10 @@ impl Ready {
     }
 
     fn go(&mut self, to: [f64; 4], feed: MmPerS) -> Result<(), PrinterError> {
+        let place = |[x, y, z, _]: [f64; 4]| [x, y, z];
+        Reach::new(&self.config)
+            .judge_way(place(self.planner.position()), place(to))
+            .map_err(|detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail).ending(Ended::Job))?;
         self.planner.push_raw_move(to, feed, LineNumber(0))
     }
 
@@ -212,11 +217,7 @@ impl Ready {
         let is_beside = |place: &[f64; 2]| {
             (0..2).any(|axis| place[axis] < low[axis] - ASIDE_MM || place[axis] > high[axis] + ASIDE_MM)
         };
-        let [x, y] = [0, 1].map(|axis: usize| {
-            let stepper = &self.config.steppers[axis];
-            [stepper.position_min.0 + FROM_ENDS_MM, stepper.position_max.0 - FROM_ENDS_MM]
-        });
-        let corners = [0, 1, 2, 3].map(|at: usize| [x[at % 2], y[at / 2]]);
+        let corners = Reach::new(&self.config).corners(FROM_ENDS_MM);
         let away = |place: &[f64; 2]| libm::hypot(place[0] - here[0], place[1] - here[1]);
         core::iter::once(here)
             .chain(corners)
