@@ -116,8 +116,8 @@ pub enum Event {
         axis: usize,
         /// Where it is, in mm.
         position_mm: f64,
-        /// How many steps of the homing move each motor made, both approaches together. Of axes that are homed together
-        /// only one says so.
+        /// How many steps of the homing move each motor made, both approaches together; of a delta's towers, the one of
+        /// that number.
         steps: [u64; MOTORS],
     },
     /// The job passed this line.

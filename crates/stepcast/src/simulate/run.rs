@@ -13,7 +13,7 @@ use printer::{
     session::{JobOptions, JobStatus, Request, Session},
 };
 use units::{Celsius, Hertz, Seconds, Ticks};
-use virtual_printer::{BoardProfile, Faults, HeaterView, HostStall, VirtualPrinter};
+use virtual_printer::{BoardProfile, Faults, Gantry, HeaterView, HostStall, VirtualPrinter};
 
 use super::{
     course::Course,
@@ -181,7 +181,8 @@ impl Simulation {
         let board = demo_machine::fit(&mut config, board.as_ref())?;
         let machine = demo_machine::machine(&config)?;
         let step_distances = printer::machine::step_distances(&config).map(|distance| distance.0);
-        let tally = Tally::new(step_distances, board.clock, config.shaper_reach());
+        let mut tally = Tally::new(step_distances, board.clock, config.shaper_reach());
+        tally.path.set_gantry(machine.gantry);
         let reach = config.shaper_reach().0;
         // Where an input shaper has the head at most, off its path.
         let limits = &config.printer;
@@ -190,13 +191,13 @@ impl Simulation {
         let printer = VirtualPrinter::new(board, &machine, &faults, seed, tally)?;
         let start = printer.start();
         let clock = HostClock::new(start, host_hz);
-        let [x, y, z, _] = step_distances;
+        let step_mm = head_step(&machine.gantry, step_distances);
         let standby = [
             ("extruder", config.extruder.as_ref().map(|extruder| extruder.heater.standby_temp)),
             ("heater_bed", config.heater_bed.as_ref().map(|bed| bed.standby_temp)),
         ]
         .map(|(name, standby)| (name, standby.unwrap_or(Celsius(0.0))));
-        let mut observer = Observer::new(&config, reference, start, quiet);
+        let mut observer = Observer::new(&config, machine.gantry, reference, start, quiet);
         if let Some(line) = options.start_line {
             observer.begin_with(line);
         }
@@ -228,7 +229,7 @@ impl Simulation {
             course: Course::default(),
             next_sample: start,
             seed,
-            path_error_max_mm: PATH_ERROR_MAX_MM.max((x * x + y * y + z * z).sqrt()) + shaped_off,
+            path_error_max_mm: PATH_ERROR_MAX_MM.max(step_mm) + shaped_off,
             wall_s: 0.0,
             after: After::default(),
             printer,
@@ -496,6 +497,18 @@ impl Simulation {
         progress.set(self.job.position());
         progress.say(format!("line {}, {:.0} s", self.observer.line, self.virtual_time().0));
     }
+}
+
+/// How far the head goes where each of its motors makes a step, in mm: in the middle of the machine.
+fn head_step(gantry: &Gantry, step_distances: [f64; 4]) -> f64 {
+    let middle = [0.0, 0.0, 10.0];
+    let squares = (0..3).map(|motor| {
+        let mut motors = gantry.motors(middle);
+        motors[motor] += step_distances[motor];
+        let head = gantry.head(motors);
+        (0..3).map(|axis| (head[axis] - middle[axis]).powi(2)).sum::<f64>()
+    });
+    squares.sum::<f64>().sqrt()
 }
 
 /// From and until when the host is held up; soonest last.

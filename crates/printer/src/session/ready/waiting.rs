@@ -197,7 +197,9 @@ impl Ready {
                 for at in (0..3).filter(|&at| axes[at]) {
                     let position_mm = home_mm[at];
                     self.planner.set_axis(at, position_mm, true);
-                    let steps = if at == axis { steps } else { [0; MOTORS] };
+                    // Of towers each tells of its own.
+                    let own = |motor: usize| if axes == [true; 3] && motor != at { 0 } else { steps[motor] };
+                    let steps = core::array::from_fn(own);
                     self.events.push(Event::Homed { axis: at, position_mm, steps });
                 }
                 self.home_next();
