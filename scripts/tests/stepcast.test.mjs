@@ -1,9 +1,10 @@
 // The native command on the samples, as a user runs it: exit status, JSON, and what a noisy line must not change.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { closeSync, mkdtempSync, openSync, readFileSync, rmSync, writeFileSync, writeSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
+import { platform } from 'node:process';
 import { after, test } from 'node:test';
 import { gzipSync } from 'node:zlib';
 
@@ -77,6 +78,75 @@ test('plan: the sample takes about what its slicer says', async () => {
 test('plan: a gzip file gives what the plain one gives', async () => {
   const packed = file('small.gcode.gz', gzipSync(readFileSync(small)));
   assert.deepEqual(await plan(packed), await plan(small));
+});
+
+/** Writes a file of any size, piece by piece. */
+function longFile(name, lines) {
+  const path = join(folder, name);
+  const out = openSync(path, 'w');
+  let piece = '';
+  for (const line of lines) {
+    piece += line;
+    if (piece.length > 1 << 20) {
+      writeSync(out, piece);
+      piece = '';
+    }
+  }
+  writeSync(out, piece);
+  closeSync(out);
+  return path;
+}
+
+/** An hour of pieces of 10 µm, to and fro: 100 MB. */
+function* crawling() {
+  yield 'G28\nM83\nG1 X20 Y20 F600\n';
+  let [x, y, step] = [20_000, 20_000, 10];
+  for (let piece = 0; piece < 3_600_000; piece += 1) {
+    x += step;
+    if (x === 20_000 || x === 180_000) {
+      step = -step;
+      y += 10;
+    }
+    yield `G1 X${(x / 1000).toFixed(3)} Y${(y / 1000).toFixed(3)} E0.00033\n`;
+  }
+}
+
+test('plan: 100 MB take no more memory than a small file', { skip: platform !== 'linux' && 'memory is read from /proc' }, async () => {
+  const peaks = [];
+  for (const path of [small, longFile('hour.gcode', crawling())]) {
+    const child = spawn(command, ['plan', path, '--config', config, '--json'], { stdio: ['ignore', 'pipe', 'inherit'] });
+    let [output, peak] = ['', 0];
+    child.stdout.on('data', (data) => (output += data));
+    const look = () => {
+      try {
+        peak = Number(/VmHWM:\s+(\d+) kB/.exec(readFileSync(`/proc/${child.pid}/status`, 'utf8'))?.[1] ?? peak);
+      } catch {
+        // It is over.
+      }
+    };
+    const looks = setInterval(look, 5);
+    const status = await new Promise((resolve) => child.on('close', resolve));
+    clearInterval(looks);
+    assert.equal(status, 0);
+    peaks.push({ kib: peak, seconds: JSON.parse(output).print_time_s });
+  }
+  const [little, much] = peaks;
+  assert.ok(much.seconds > 3600 && much.seconds < 3700, `${much.seconds} s`);
+  assert.ok(little.kib > 0 && much.kib < little.kib + 16 * 1024, JSON.stringify(peaks));
+});
+
+test('plan: what makes no sense moves nothing, and all ends soon', async () => {
+  const start = performance.now();
+  const zero = await plan(longFile('zero.gcode', ['G28\nG1 X10 F600\n', ...Array(1_000_000).fill('G1 X10\n')]));
+  assert.deepEqual([zero.moves, zero.motors.stepper_x.steps], [1, 800]);
+  const absurd = ['X1e300', 'Xnan', 'Xinf', 'X-1e-300', `X${'9'.repeat(60)}`, 'X1e', 'X', 'X--1', 'X0x10'];
+  const path = file('absurd.gcode', `G28\nG1 X10 F600\n${absurd.map((words) => `G1 ${words}\n`).join('')}G1 X20`);
+  const report = await plan(path);
+  assert.ok(report.print_time_s < 60 && report.motors.stepper_x.steps < 10_000, JSON.stringify(report));
+  const { status, stdout } = await run('check', path, '--config', config);
+  assert.equal(status, 1);
+  for (const line of [3, 4, 5, 6, 7, 8, 9, 10, 11]) assert.match(stdout, new RegExp(`absurd.gcode:${line}:.*error`), stdout);
+  assert.ok(performance.now() - start < 60_000);
 });
 
 /** A print on the virtual printer that has to come out right. */

@@ -6,6 +6,8 @@
 //! motion**, which is a stretch that begins and ends at rest.
 
 mod dynamics;
+#[cfg(test)]
+mod extrusion_tests;
 mod guard;
 mod item;
 mod judge;

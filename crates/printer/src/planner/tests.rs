@@ -7,15 +7,15 @@ use units::Celsius;
 use super::*;
 use crate::{config, machine::MOTORS};
 
-const CLOCK: Hertz = Hertz(12_000_000);
+pub(super) const CLOCK: Hertz = Hertz(12_000_000);
 
-fn machine_file() -> PrinterConfig {
+pub(super) fn machine_file() -> PrinterConfig {
     let text = include_str!("../../../../samples/printer.cfg");
     config::parse(text).0.expect("the sample machine")
 }
 
 /// A planner that is homed and hot.
-fn planner() -> (Planner, Source) {
+pub(super) fn planner() -> (Planner, Source) {
     let mut planner = Planner::new(&machine_file(), CLOCK).unwrap();
     (0..3).for_each(|axis| planner.set_axis(axis, 0.0, true));
     planner.guard.extrusion = ExtrusionPermit::Allowed;
