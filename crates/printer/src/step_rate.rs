@@ -174,9 +174,9 @@ impl StepRates {
         let draws =
             planned.direction[EXTRUDER] > 0.0 && (planned.direction[0] != 0.0 || planned.direction[1] != 0.0);
         let shares = self.ways(planned.direction, planned.from, planned.to);
-        for motor in 0..MOTORS {
+        for (motor, share) in shares.into_iter().enumerate() {
             let added = if draws && motor == EXTRUDER { self.added(planned) } else { 0.0 };
-            let speed = MmPerS((planned.cruise_velocity + added) * shares[motor]);
+            let speed = MmPerS((planned.cruise_velocity + added) * share);
             if speed > self.speed_max[motor] * (1.0 + SLACK) {
                 return Err(self.too_fast(motor, speed, planned.tag));
             }

@@ -41,8 +41,8 @@ impl Gantry {
         let [a, b, c] = motors;
         match self {
             Self::Cartesian => motors,
-            Self::CoreXy => [(a + b) / 2.0, (a - b) / 2.0, c],
-            Self::CoreXz => [(a + c) / 2.0, b, (a - c) / 2.0],
+            Self::CoreXy => [0.5 * a + 0.5 * b, 0.5 * a - 0.5 * b, c],
+            Self::CoreXz => [0.5 * a + 0.5 * c, b, 0.5 * a - 0.5 * c],
             Self::HybridCoreXy => [a + b, b, c],
             Self::HybridCoreXz => [a + c, b, c],
             Self::Delta(towers) => towers.head(motors),
@@ -60,6 +60,18 @@ impl Gantry {
             Self::HybridCoreXz => [x - z, y, z],
             Self::Delta(towers) => towers.carriages(head),
         }
+    }
+
+    /// How far the head goes where each of its motors makes a step, in the middle of the machine.
+    pub fn head_step(&self, [a, b, c, _]: [f64; 4]) -> f64 {
+        let middle = [0.0, 0.0, 10.0];
+        let squares = [a, b, c].into_iter().enumerate().map(|(motor, step)| {
+            let mut motors = self.motors(middle);
+            motors[motor] += step;
+            let head = self.head(motors);
+            (0..3).map(|axis| (head[axis] - middle[axis]) * (head[axis] - middle[axis])).sum::<f64>()
+        });
+        squares.sum::<f64>().sqrt()
     }
 
     /// Whether all of it is numbers, and towers stand apart.

@@ -13,7 +13,7 @@ use printer::{
     session::{JobOptions, JobStatus, Request, Session},
 };
 use units::{Celsius, Hertz, Seconds, Ticks};
-use virtual_printer::{BoardProfile, Faults, Gantry, HeaterView, HostStall, VirtualPrinter};
+use virtual_printer::{BoardProfile, Faults, HeaterView, HostStall, VirtualPrinter};
 
 use super::{
     course::Course,
@@ -191,7 +191,7 @@ impl Simulation {
         let printer = VirtualPrinter::new(board, &machine, &faults, seed, tally)?;
         let start = printer.start();
         let clock = HostClock::new(start, host_hz);
-        let step_mm = head_step(&machine.gantry, step_distances);
+        let step_mm = machine.gantry.head_step(step_distances);
         let standby = [
             ("extruder", config.extruder.as_ref().map(|extruder| extruder.heater.standby_temp)),
             ("heater_bed", config.heater_bed.as_ref().map(|bed| bed.standby_temp)),
@@ -497,18 +497,6 @@ impl Simulation {
         progress.set(self.job.position());
         progress.say(format!("line {}, {:.0} s", self.observer.line, self.virtual_time().0));
     }
-}
-
-/// How far the head goes where each of its motors makes a step, in mm: in the middle of the machine.
-fn head_step(gantry: &Gantry, step_distances: [f64; 4]) -> f64 {
-    let middle = [0.0, 0.0, 10.0];
-    let squares = (0..3).map(|motor| {
-        let mut motors = gantry.motors(middle);
-        motors[motor] += step_distances[motor];
-        let head = gantry.head(motors);
-        (0..3).map(|axis| (head[axis] - middle[axis]).powi(2)).sum::<f64>()
-    });
-    squares.sum::<f64>().sqrt()
 }
 
 /// From and until when the host is held up; soonest last.
