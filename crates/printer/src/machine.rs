@@ -200,3 +200,51 @@ pub fn gcode_settings(config: &PrinterConfig) -> gcode::Settings {
     });
     gcode::Settings { retraction }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn machines() -> [PrinterConfig; 3] {
+        let core = crate::config::SMALL_MACHINE.replace("kinematics: cartesian", "kinematics: corexy");
+        [crate::config::SMALL_MACHINE, &core, crate::config::SMALL_DELTA]
+            .map(|text| crate::config::parse(text).0.expect("a machine"))
+    }
+
+    proptest! {
+        #[test]
+        fn the_head_is_found_exactly_so_many_steps_away(
+            // Places half-way between two steps are the hard ones.
+            halves in [-4000..4000_i32, -4000..4000_i32, 0..8000_i32],
+            made in [-3000..3000_i32, -3000..3000_i32, -3000..3000_i32, -999..999_i32],
+        ) {
+            for config in machines() {
+                let motors = Motors::new(&config);
+                let [x, y, z] = halves.map(|half| f64::from(half) * 0.00625);
+                let from = [x, y, z, 1.5];
+                let there = motors.moved(&from, made).expect("a place");
+                let counts = [from, there].map(|at| motors.counts(&at));
+                for motor in 0..MOTORS {
+                    prop_assert_eq!(counts[1][motor] - counts[0][motor], f64::from(made[motor]));
+                }
+                let back = motors.moved(&there, made.map(|steps| -steps)).expect("a place");
+                for axis in 0..MOTORS {
+                    prop_assert!((back[axis] - from[axis]).abs() < 1e-6, "{:?} {:?}", from, back);
+                }
+                prop_assert_eq!(motors.counts(&back), counts[0]);
+            }
+        }
+    }
+
+    #[test]
+    fn towers_home_together() {
+        let [cartesian, core, delta] = machines();
+        let x = [true, false, false];
+        assert_eq!([&cartesian, &core].map(|config| homed_together(config, x)), [x; 2]);
+        assert_eq!(homed_together(&delta, x), [true; 3]);
+        assert_eq!(homed_together(&delta, [false; 3]), [false; 3]);
+        assert_eq!([&cartesian, &core, &delta].map(has_z_motor), [true, true, false]);
+        assert_eq!(motor_names(&delta)[2], "stepper_c");
+    }
+}

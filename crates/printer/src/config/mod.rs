@@ -177,4 +177,6 @@ pub(crate) const SMALL_MACHINE: &str = include_str!("small_machine.cfg");
 pub(crate) const SMALL_DELTA: &str = include_str!("small_delta.cfg");
 
 #[cfg(test)]
+mod kinematics_tests;
+#[cfg(test)]
 mod tests;

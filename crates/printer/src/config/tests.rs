@@ -55,7 +55,7 @@ fn the_extruders_limits_follow_from_nozzle_and_filament() {
 }
 
 /// The machine with the first `old` replaced, or, where `old` is empty, with text put after it.
-fn with(old: &str, new: &str) -> String {
+pub(super) fn with(old: &str, new: &str) -> String {
     assert!(SMALL_MACHINE.contains(old), "`{old}` is not there");
     if old.is_empty() {
         return format!("{SMALL_MACHINE}{new}");
@@ -68,7 +68,7 @@ fn line_of(text: &str, what: &str) -> u32 {
 }
 
 /// Asserts that a change gives one diagnostic, on the line that holds `at` (none: the whole file), saying `words`.
-fn assert_diagnosed(text: &str, severity: Severity, at: &str, words: &str) {
+pub(super) fn assert_diagnosed(text: &str, severity: Severity, at: &str, words: &str) {
     let (config, diagnostics) = parse(text);
     let line = if at.is_empty() { 0 } else { line_of(text, at) };
     assert_eq!(config.is_some(), severity != Severity::Error, "{diagnostics:#?}");

@@ -271,3 +271,90 @@ fn a_cancelled_approach_is_stopped_once_it_moves() {
     assert_eq!(table.poll(false), Ok(Wish::Abandon));
     assert_eq!(table.poll(true), Ok(Wish::Cancelled));
 }
+
+/// A delta on its way up.
+fn towers() -> Table {
+    let config = config::parse(config::SMALL_DELTA).0.expect("a delta");
+    let board = Board::for_tests(&config);
+    let homing = AxisHoming::new(0, &config, &board).expect("towers");
+    Table { board, homing, now: Seconds::ZERO }
+}
+
+impl Table {
+    fn positions(&mut self, steps: [i32; 3]) -> Result<(), PrinterError> {
+        assert_eq!(self.poll(true), Ok(Wish::Wait));
+        let oids: Vec<u8> = self.homing.movers.iter().map(|mover| mover.oid).collect();
+        oids.into_iter().zip(steps).try_for_each(|(oid, at)| self.homing.on_position(oid, at, self.now))
+    }
+
+    fn tower(&mut self, tower: u8, reason: u8) -> Result<(), PrinterError> {
+        self.homing.on_trigger(TRIGGER + 2 * tower, false, reason, self.now, &mut self.board)
+    }
+
+    fn towers_approach(&mut self, steps: [i32; 3]) -> HomingMove {
+        self.positions(steps).unwrap();
+        let Ok(Wish::Move(wanted)) = self.poll(true) else { panic!() };
+        let start = self.board.clock_at(self.now);
+        self.homing.run_started(start, &mut self.board, self.now);
+        wanted
+    }
+}
+
+#[test]
+fn towers_run_up_together_and_each_stops_at_its_own_switch() {
+    let mut table = towers();
+    let up = table.towers_approach([10, 20, 30]);
+    assert_eq!(table.homing.axes, [true; 3]);
+    assert!(up.to_mm == 300.0 && up.from_mm < -300.0, "{up:?}");
+    for tower in [2, 0] {
+        table.tower(tower, REASON_ENDSTOP).unwrap();
+        // What is heard of it once more changes nothing, and the last one is still on its way.
+        table.tower(tower, REASON_HOST).unwrap();
+        assert_eq!(table.poll(false), Ok(Wish::Wait));
+    }
+    table.tower(1, REASON_ENDSTOP).unwrap();
+    assert_eq!(table.poll(false), Ok(Wish::Abandon));
+    table.positions([3210, 4020, 2030]).unwrap();
+    table.back_off();
+    for (tower, left) in [(0, true), (1, true), (2, false)] {
+        table.homing.on_endstop(ENDSTOP + 2 * tower, false, false, table.now, &mut table.board).unwrap();
+        assert_eq!(table.homing.second, !left);
+    }
+    table.towers_approach([2810, 3620, 1630]);
+    for tower in [0, 1, 2] {
+        table.tower(tower, REASON_ENDSTOP).unwrap();
+    }
+    assert_eq!(table.poll(false), Ok(Wish::Abandon));
+    table.positions([3211, 4021, 2031]).unwrap();
+    assert_eq!(table.poll(true), Ok(Wish::Done));
+    assert_eq!(table.homing.steps(), [3200 + 401, 4000 + 401, 2000 + 401, 0]);
+}
+
+#[test]
+fn a_tower_that_does_not_move_or_find_its_switch_is_an_error() {
+    let mut table = towers();
+    table.towers_approach([0; 3]);
+    table.tower(0, REASON_ENDSTOP).unwrap();
+    assert_eq!(table.tower(1, REASON_HOST).unwrap_err().code, ErrorCode::EndstopNotReached);
+    let mut table = towers();
+    table.homing.second = true;
+    table.towers_approach([0; 3]);
+    for tower in [0, 1, 2] {
+        table.tower(tower, REASON_ENDSTOP).unwrap();
+    }
+    assert_eq!(table.poll(false), Ok(Wish::Abandon));
+    assert_eq!(table.positions([400, 0, 400]).unwrap_err().code, ErrorCode::EndstopBeforeMove);
+}
+
+#[test]
+fn motors_that_move_an_axis_together_stop_together() {
+    let text = include_str!("../../../../../samples/corexy.cfg");
+    let config = config::parse(text).0.expect("a machine");
+    let board = Board::for_tests(&config);
+    for (axis, motors) in [(0, vec![0, 1]), (1, vec![0, 1]), (2, vec![2])] {
+        let homing = AxisHoming::new(axis, &config, &board).expect("an axis");
+        assert_eq!(homing.stops.len(), 1);
+        assert_eq!(homing.movers.iter().map(|mover| mover.motor).collect::<Vec<_>>(), motors);
+        assert!(homing.movers.iter().all(|mover| mover.stop == 0));
+    }
+}
