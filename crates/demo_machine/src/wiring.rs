@@ -116,6 +116,8 @@ fn loads(gantry: &Gantry, index: usize) -> (f64, f64) {
     match (gantry, index) {
         // Two motors share what hangs on one belt and the other.
         (Gantry::CoreXy, 0 | 1) => (MOVED_KG[1] / 2.0, 0.0),
+        // What hangs on a single belt is light, or it would fall without current.
+        (Gantry::HybridCoreXz, 2) => (MOVED_KG[0], MOVED_KG[0]),
         (Gantry::CoreXz, 0) => (z / 2.0, z / 2.0),
         (Gantry::CoreXz, 2) => (z / 2.0, -z / 2.0),
         (Gantry::Delta(_), _) => (TOWER_KG, TOWER_KG),

@@ -62,7 +62,7 @@ impl Gantry {
         }
     }
 
-    /// How far the head goes where each of its motors makes a step, in the middle of the machine.
+    /// How far the head goes at most where each of its motors makes a step, in the middle of the machine.
     pub fn head_step(&self, [a, b, c, _]: [f64; 4]) -> f64 {
         let middle = [0.0, 0.0, 10.0];
         let squares = [a, b, c].into_iter().enumerate().map(|(motor, step)| {
@@ -71,7 +71,9 @@ impl Gantry {
             let head = self.head(motors);
             (0..3).map(|axis| (head[axis] - middle[axis]) * (head[axis] - middle[axis])).sum::<f64>()
         });
-        squares.sum::<f64>().sqrt()
+        // Axes of their own go at right angles.
+        let is_square = matches!(self, Self::Cartesian);
+        if is_square { squares.sum::<f64>().sqrt() } else { squares.map(f64::sqrt).sum() }
     }
 
     /// Whether all of it is numbers, and towers stand apart.

@@ -5,6 +5,7 @@
 //! The board's trigger fires by itself when the host falls silent, so a lost link stops the axis. Where that was but a
 //! bad moment of the line, the axis goes on from where it stands, a few times: no further altogether than one approach goes.
 
+use steps::Geometry;
 use units::{Seconds, Ticks};
 use wire::Command;
 
@@ -62,6 +63,7 @@ pub(super) struct AxisHoming {
     pub(super) home_mm: [f64; 3],
     stops: Vec<Stop>,
     movers: Vec<Mover>,
+    geometry: Geometry,
     stage: Stage,
     second: bool,
     cancelled: bool,
@@ -95,6 +97,7 @@ impl AxisHoming {
             home_mm: config.steppers.each_ref().map(|stepper| stepper.position_endstop.0),
             stops,
             movers,
+            geometry: machine::geometry(config),
             stage: Stage::PositionBefore,
             second: false,
             cancelled: false,
@@ -217,6 +220,13 @@ impl AxisHoming {
                 self.ask(questions, board, now)?;
                 Ok(Wish::Wait)
             }
+            Stage::PlanStraight(by) => Ok(Wish::Straighten(by)),
+            Stage::Straight => {
+                if at_rest {
+                    self.enter(Stage::Done);
+                }
+                Ok(Wish::Wait)
+            }
             Stage::Done => Ok(Wish::Done),
         }
     }
@@ -226,16 +236,19 @@ impl AxisHoming {
         match self.stage {
             Stage::PositionBefore | Stage::PositionAfter | Stage::Released => true,
             // Its move may be on the way to the stream.
-            Stage::Plan | Stage::PlanRetract | Stage::Retract => at_rest,
+            Stage::Plan | Stage::PlanRetract | Stage::Retract | Stage::PlanStraight(_) | Stage::Straight => {
+                at_rest
+            }
             Stage::Approach { .. } | Stage::Done => false,
         }
     }
 
     /// Its move has become a run that starts at this clock: the trigger is armed before the first step.
     pub(super) fn run_started(&mut self, start: Ticks, board: &mut Board, now: Seconds) {
-        if self.stage == Stage::PlanRetract {
-            self.enter(Stage::Retract);
-            return;
+        match self.stage {
+            Stage::PlanRetract => return self.enter(Stage::Retract),
+            Stage::PlanStraight(_) => return self.enter(Stage::Straight),
+            _ => {}
         }
         // Between steps there is nothing new to see.
         let rest = Seconds(self.step_mm() / self.speeds[usize::from(self.second)].0);
@@ -276,6 +289,11 @@ impl AxisHoming {
             trsync_oid: trsync,
             trigger_reason: REASON_ENDSTOP,
         });
+    }
+
+    /// Nothing has to be moved back.
+    pub(super) fn is_straight(&mut self) {
+        self.enter(Stage::Done);
     }
 
     /// The approach has been planned to its end.
@@ -369,25 +387,7 @@ impl AxisHoming {
 
     /// Every motor has been stopped.
     fn stopped(&mut self, board: &mut Board) {
-        for stop in &self.stops {
-            board.control(&Command::EndstopHome {
-                oid: stop.oids.endstop.0,
-                clock: 0,
-                sample_ticks: 0,
-                sample_count: 0,
-                rest_ticks: 0,
-                pin_value: 0,
-                trsync_oid: 0,
-                trigger_reason: 0,
-            });
-            // Armed anew without reports: it has nothing more to say.
-            board.control(&Command::TrsyncStart {
-                oid: stop.oids.trsync.0,
-                report_clock: 0,
-                report_ticks: 0,
-                expire_reason: 0,
-            });
-        }
+        self.stops.iter().for_each(|stop| stop.disarm(board));
         self.abandon = true;
         self.enter(Stage::PositionAfter);
     }
@@ -458,6 +458,7 @@ impl AxisHoming {
         let Some(mover) = mover else { return Ok(()) };
         let made = u64::from(position.wrapping_sub(mover.position).unsigned_abs());
         (mover.position, mover.has_answered) = (position, true);
+        mover.first.get_or_insert(position);
         if !before {
             mover.steps += made;
             mover.approach_steps += made;
@@ -479,7 +480,12 @@ impl AxisHoming {
             return Err(self.fail(ErrorCode::EndstopBeforeMove, "on its second approach"));
         }
         let again = !self.second && self.retract_mm > 0.0;
-        self.enter(if again { Stage::PlanRetract } else { Stage::Done });
+        let drift = parts::drift(self.axis, &self.movers, &self.geometry);
+        self.enter(match drift {
+            _ if again => Stage::PlanRetract,
+            [0.0, 0.0, 0.0] => Stage::Done,
+            drift => Stage::PlanStraight(drift),
+        });
         Ok(())
     }
 }

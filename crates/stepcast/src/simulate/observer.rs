@@ -327,7 +327,10 @@ impl Observer {
     /// endstop counts by what was made of it, which comes with [`Event::Homed`].
     fn plan_steps(&mut self, scheduled: &ScheduledMove) {
         let (from, to) = (scheduled.from, scheduled.to);
-        let reaches = |axis: usize| to[axis] == self.endstop_mm[axis] && from[axis] != self.endstop_mm[axis];
+        // A step or two are no approach: motors that have not stopped together are put right.
+        let short = 3.0 * self.step_distance_mm[..EXTRUDER].iter().copied().fold(0.0, f64::max);
+        let reaches =
+            |axis: usize| to[axis] == self.endstop_mm[axis] && (from[axis] - to[axis]).abs() > short;
         if scheduled.homing && (0..EXTRUDER).any(reaches) {
             return;
         }

@@ -293,6 +293,11 @@ impl PathCheck {
         self.motors_mm.get(motor).copied().unwrap_or(self.filament)
     }
 
+    /// Whether motors move axes together.
+    pub(crate) const fn is_coupled(&self) -> bool {
+        self.gantry.is_coupled()
+    }
+
     /// Where a motor is when the machine is there.
     pub(crate) fn motor_mm(&self, motor: usize, [x, y, z, e]: [f64; 4]) -> f64 {
         self.gantry.motors([x, y, z]).get(motor).copied().unwrap_or(e)

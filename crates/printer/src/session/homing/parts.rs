@@ -2,13 +2,18 @@
 //!
 //! Knows the machine's kinematics. Steps are the board's.
 
+use steps::Geometry;
 use units::{Seconds, Ticks};
+use wire::Command;
 
 use crate::{
     config::{Kinematics, PrinterConfig},
     machine::{self, MOTORS},
     session::{board::Board, layout::EndstopOids},
 };
+
+/// Less than this is rounding, no motion.
+const DRIFT_MIN_MM: f64 = 1e-9;
 
 /// A straight move that homing wants made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +37,9 @@ pub(in crate::session) enum Wish {
     Abandon,
     /// The board stopped the motor because it had heard nothing; it now goes on. The user should know of it.
     GoesOn,
+    /// The motors of other axes have not stopped at the very same step, which has moved those axes by so much, in mm: have
+    /// them moved back, as [`Self::Move`], or call `AxisHoming::is_straight`.
+    Straighten([f64; 3]),
     /// The axis is home.
     Done,
     /// The axis stands still because it was told to; where, nobody knows.
@@ -59,6 +67,10 @@ pub(super) enum Stage {
     Retract,
     /// Ask whether the endstop has been let go.
     Released,
+    /// Have other axes moved back.
+    PlanStraight([f64; 3]),
+    /// On that way.
+    Straight,
     Done,
 }
 
@@ -74,6 +86,29 @@ pub(super) struct Stop {
     pub(super) is_released: bool,
 }
 
+impl Stop {
+    /// It watches nothing any more.
+    pub(super) fn disarm(&self, board: &mut Board) {
+        board.control(&Command::EndstopHome {
+            oid: self.oids.endstop.0,
+            clock: 0,
+            sample_ticks: 0,
+            sample_count: 0,
+            rest_ticks: 0,
+            pin_value: 0,
+            trsync_oid: 0,
+            trigger_reason: 0,
+        });
+        // Armed anew without reports: it has nothing more to say.
+        board.control(&Command::TrsyncStart {
+            oid: self.oids.trsync.0,
+            report_clock: 0,
+            report_ticks: 0,
+            expire_reason: 0,
+        });
+    }
+}
+
 /// A motor on its way.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mover {
@@ -82,7 +117,10 @@ pub(super) struct Mover {
     /// The switch that stops it, by its place.
     pub(super) stop: usize,
     pub(super) step_mm: f64,
-    /// Where the board last said that it stands, and whether it has answered the present question.
+    pub(super) invert_dir: bool,
+    /// Where it stood before anything was done …
+    pub(super) first: Option<i32>,
+    /// … and where the board last said that it stands, and whether it has answered the present question.
     pub(super) position: i32,
     pub(super) has_answered: bool,
     /// Steps that it has made in the present approach, and in both.
@@ -104,6 +142,8 @@ pub(super) fn parts(axis: usize, config: &PrinterConfig, board: &Board) -> Optio
             oid: board.layout.steppers[motor]?.stepper.0,
             stop,
             step_mm: machine::step_distances(config)[motor].0,
+            invert_dir: board.layout.steppers[motor]?.invert_dir,
+            first: None,
             position: 0,
             has_answered: false,
             approach_steps: 0,
@@ -118,6 +158,26 @@ pub(super) fn parts(axis: usize, config: &PrinterConfig, board: &Board) -> Optio
     let movers: Option<Vec<Mover>> =
         (0..MOTORS).filter(|&motor| motors[motor]).map(|motor| mover(motor, 0)).collect();
     Some((vec![stop(axis)], movers?))
+}
+
+/// By how much all of that has moved axes that are not homed, in mm.
+pub(super) fn drift(axis: usize, movers: &[Mover], geometry: &Geometry) -> [f64; 3] {
+    let mut gone = [0.0; MOTORS];
+    for mover in movers {
+        let steps = mover.first.map_or(0, |first| mover.position.wrapping_sub(first));
+        let steps = if mover.invert_dir { steps.wrapping_neg() } else { steps };
+        gone[mover.motor] = f64::from(steps) * mover.step_mm;
+    }
+    match geometry {
+        Geometry::Linear(linear) => {
+            let [x, y, z, _] = linear.position(&gone);
+            let mut drift = [x, y, z].map(|by| if by.abs() > DRIFT_MIN_MM { by } else { 0.0 });
+            drift[axis] = 0.0;
+            drift
+        }
+        // An axis with a motor of its own moves nothing else; towers are all homed.
+        Geometry::Cartesian | Geometry::Delta(_) => [0.0; 3],
+    }
 }
 
 /// How far its carriage is taken to be from its endstop at most, for an axis of this length, in mm.

@@ -358,3 +358,31 @@ fn motors_that_move_an_axis_together_stop_together() {
         assert!(homing.movers.iter().all(|mover| mover.stop == 0));
     }
 }
+
+#[test]
+fn what_motors_that_stopped_apart_have_moved_goes_back() {
+    let text =
+        include_str!("../../../../../samples/corexy.cfg").replacen("retract_dist: 5", "retract_dist: 0", 1);
+    let config = config::parse(&text).0.expect("a machine");
+    // The second motor's direction pin is inverted: it counts down where it goes forward.
+    for (ends, by) in [([-800, 800], 0.0), ([-801, 800], -0.5), ([-800, 803], 1.5)] {
+        let board = Board::for_tests(&config);
+        let homing = AxisHoming::new(0, &config, &board).expect("an axis");
+        let mut table = Table { board, homing, now: Seconds::ZERO };
+        table.towers_approach([0; 3]);
+        table.trigger(false, REASON_ENDSTOP).unwrap();
+        assert_eq!(table.poll(false), Ok(Wish::Abandon));
+        table.positions([ends[0], ends[1], 0]).unwrap();
+        if by == 0.0 {
+            assert_eq!(table.poll(true), Ok(Wish::Done));
+            continue;
+        }
+        let Ok(Wish::Straighten(drift)) = table.poll(true) else { panic!("{:?}", table.poll(true)) };
+        assert_eq!((drift[0], drift[2]), (0.0, 0.0));
+        assert!((drift[1] - by * 0.0125).abs() < 1e-12, "{drift:?}");
+        table.homing.run_started(Ticks(0), &mut table.board, table.now);
+        assert_eq!(table.poll(false), Ok(Wish::Wait));
+        assert_eq!(table.poll(true), Ok(Wish::Wait));
+        assert_eq!(table.poll(true), Ok(Wish::Done));
+    }
+}

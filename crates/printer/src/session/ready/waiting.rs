@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use gcode::{Heater as HeaterName, LineNumber, Wait as HeatWait};
-use units::{Celsius, Seconds};
+use units::{Celsius, MmPerS, Seconds};
 
 use super::{Failure, Ready};
 use crate::{
@@ -16,6 +16,9 @@ use crate::{
         homing::{AxisHoming, Wish},
     },
 };
+
+/// A step or two, to put axes right that homing has moved.
+const STRAIGHTEN_SPEED: MmPerS = MmPerS(5.0);
 
 /// Something that has to be over before the G-code goes on.
 #[derive(Debug)]
@@ -188,6 +191,11 @@ impl Ready {
                     self.planner.set_axis(axis, home_mm[axis], false);
                 }
             }
+            Ok(Wish::Straighten(by)) => {
+                if at_rest {
+                    self.straighten(by, now);
+                }
+            }
             Ok(Wish::GoesOn) => {
                 let text = "homing was stopped by the board, which heard nothing for a moment: it goes on from there";
                 self.events.push(Event::Message(text.into()));
@@ -205,9 +213,31 @@ impl Ready {
                 self.home_next();
             }
             Ok(Wish::Cancelled) => {
+                // Motors that move another axis as well may have left it a step or two off.
+                let lost = self.coupled(core::array::from_fn(|it| it == axis));
+                (0..3).filter(|&axis| lost[axis]).for_each(|axis| self.planner.guard.set_homed(axis, false));
                 self.wait = Wait::Nothing;
                 self.planner.correct(&mut self.console.source);
             }
+            Err(error) => self.homing_failed(error, now),
+        }
+    }
+
+    /// Homing has moved axes by so much that are where they are: they go back.
+    fn straighten(&mut self, by: [f64; 3], now: Seconds) {
+        let Wait::Homing { axis: homing, .. } = &mut self.wait else { return };
+        let homed = self.planner.guard.homed();
+        let to = self.planner.position();
+        let mut from = to;
+        for axis in (0..3).filter(|&axis| homed[axis]) {
+            from[axis] += by[axis];
+        }
+        if from == to {
+            return homing.is_straight();
+        }
+        self.planner.stand_at(from);
+        match self.planner.push_raw_move(to, STRAIGHTEN_SPEED, LineNumber(0)) {
+            Ok(()) => drop(self.planner.finish_run()),
             Err(error) => self.homing_failed(error, now),
         }
     }

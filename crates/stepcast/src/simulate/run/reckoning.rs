@@ -113,7 +113,9 @@ fn wrong(
         let Motor { planned_steps, counted_steps, lost_steps, end_position_mm } = &motors[name];
         if observer.is_filtered(index) {
             let end = observer.end.map_or(*end_position_mm, |end| tally.path.motor_mm(index, end));
-            if (end_position_mm - end).abs() > observer.step_distance_mm[index] {
+            // Where motors that stop together at an endstop stopped, each is rounded once more.
+            let off_max = observer.step_distance_mm[index] * if tally.path.is_coupled() { 1.5 } else { 1.0 };
+            if (end_position_mm - end).abs() > off_max {
                 return Some(format!("{name} stands at {end_position_mm} mm, the print ends at {end} mm"));
             }
         } else if planned_steps != counted_steps {
