@@ -5,8 +5,10 @@
 // once a minute after five minutes (and for a few seconds whenever the title changes); only a run of more than that sees the
 // second.
 
+import { MainThread } from '../fixtures/main_thread.ts';
 import { type PlainBrowser, type Tab, Wire, withPlainBrowser } from '../fixtures/plain_browser.ts';
 import { expect, measured, SerialPanel, test } from '../fixtures/serial.ts';
+import { judgeTasks } from '../fixtures/test.ts';
 import type { View } from '../fixtures/views.ts';
 import { strolling } from '../serial/gcode.ts';
 import type { BridgePort } from '../serial/port.ts';
@@ -100,30 +102,20 @@ function judge({ ticks, views }: Probe, hiddenAt: number): void {
   if (seconds > GRACE_S) expect(after(GRACE_S)).toBeLessThan((seconds - GRACE_S) / 5);
 }
 
-async function hide(
-  browser: PlainBrowser,
-  url: string,
-  port: BridgePort,
-  printer: PrinterDevice,
-): Promise<void> {
-  const wire = await Wire.open(browser.url);
-  try {
-    const page = await wire.attach(url);
-    await page.evaluate(probe);
-    port.goOnInRealTime();
-    await passes(printer, 1);
-    const { targetId } = await wire.send('Target.createTarget', { url: 'about:blank' });
-    await wire.send('Target.activateTarget', { targetId });
-    await expect.poll(() => isHidden(page)).toBe('hidden');
-    const hiddenAt = await page.evaluate(() => performance.now());
-    const other = await wire.attachTo(String(targetId));
-    await other.evaluate(burn);
-    await passes(printer, HIDDEN_S);
-    judge(await page.evaluate(() => (globalThis as unknown as { probe: Probe }).probe), hiddenAt);
-    expect(await isHidden(page)).toBe('hidden');
-  } finally {
-    wire.close();
-  }
+async function hide(wire: Wire, url: string, port: BridgePort, printer: PrinterDevice): Promise<void> {
+  const page = await wire.attach(url);
+  await page.evaluate(probe);
+  port.goOnInRealTime();
+  await passes(printer, 1);
+  const { targetId } = await wire.send('Target.createTarget', { url: 'about:blank' });
+  await wire.send('Target.activateTarget', { targetId });
+  await expect.poll(() => isHidden(page)).toBe('hidden');
+  const hiddenAt = await page.evaluate(() => performance.now());
+  const other = await wire.attachTo(String(targetId));
+  await other.evaluate(burn);
+  await passes(printer, HIDDEN_S);
+  judge(await page.evaluate(() => (globalThis as unknown as { probe: Probe }).probe), hiddenAt);
+  expect(await isHidden(page)).toBe('hidden');
 }
 
 test('hidden and throttled while another tab burns the processor: 0 underruns, 0 holds', async ({
@@ -136,8 +128,15 @@ test('hidden and throttled while another tab burns the processor: 0 underruns, 0
   const port = bridge.add(printer, { ...FAST, granted: true });
   // Nobody looks at the view, and drawing it in software takes what the test needs.
   await withPlainBrowser(['--disable-3d-apis'], async (browser) => {
-    await startPrint(browser, site.url, double, printer);
-    await hide(browser, site.url, port, printer);
+    const wire = await Wire.open(browser.url);
+    try {
+      const mainThread = await MainThread.watchOver(wire, site.url);
+      await startPrint(browser, site.url, double, printer);
+      await hide(wire, site.url, port, printer);
+      await judgeTasks(mainThread, test.info().annotations);
+    } finally {
+      wire.close();
+    }
     const { motors, shutdown } = printer.state();
     expect([shutdown, ...motors.map((motor) => motor.lost_steps)]).toEqual([null, 0, 0, 0, 0]);
   });

@@ -101,9 +101,19 @@ test('a tab that is gone without a word is told, one that says good-bye is not',
   say({ kind: 'bye', id: 'b', trouble: null });
   expect([shown(), page.trouble.value, locks.waiting.size]).toEqual([['a'], null, 1]);
   locks.free('a');
+  vi.advanceTimersByTime(300);
   expect(shown()).toEqual([]);
   expect(page.trouble.value?.happened).toBe('The tab that drove Machine a is gone in the middle of a print.');
   expect(page.connection.value).toBe('closed');
+});
+
+test('a good-bye may come after the lock', () => {
+  say({ kind: 'view', view: view('a') });
+  locks.free('a');
+  vi.advanceTimersByTime(100);
+  say({ kind: 'bye', id: 'a', trouble: null });
+  vi.advanceTimersByTime(1000);
+  expect([shown(), page.trouble.value]).toEqual([[], null]);
 });
 
 test('a connection that broke over there is told with its reason', () => {
@@ -119,6 +129,7 @@ test('a tab with a machine of its own is no viewer, and is told nothing of other
   // Its own worker is heard on the channel, too.
   say({ kind: 'view', view: view(page.connectionId.value) });
   locks.free('a');
+  vi.advanceTimersByTime(300);
   expect([shown(), page.trouble.value]).toEqual([[], null]);
 });
 

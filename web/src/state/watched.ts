@@ -17,6 +17,8 @@ import { connection, connectionId, report } from './machine';
 const STALE_MS = 2000;
 /** A stop that is not answered by then is taken for lost. */
 const STOP_ANSWER_MS = 1000;
+/** The lock can be free before the good-bye of its tab is heard, which is waited for so long. */
+const BYE_MS = 200;
 /** More machines than one computer has ports for. */
 const MACHINES_MAX = 8;
 
@@ -60,12 +62,16 @@ function seen(view: MachineView): void {
   put(view, false);
 }
 
-/** The lock comes to this tab when the other one lets go of it, or is gone. */
+/** The lock comes to this tab when the other one lets go of it after its good-bye, or is gone without one. */
 function watchFor(id: string): void {
   const stop = new AbortController();
   watches.set(id, stop);
   navigator.locks
-    .request(liveLock(id), { mode: 'shared', signal: stop.signal }, () => lost(id))
+    .request(liveLock(id), { mode: 'shared', signal: stop.signal }, () => {
+      setTimeout(() => {
+        if (!stop.signal.aborted) lost(id);
+      }, BYE_MS);
+    })
     .catch(() => {
       // It said good-bye before.
     });
