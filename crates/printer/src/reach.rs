@@ -79,6 +79,27 @@ impl Reach {
         Ok(())
     }
 
+    /// How high the way across from one place to another can be: as high as wanted, or as high as it goes without coming
+    /// below `floor`. None where even that is too high.
+    pub(crate) fn across(&self, from: [f64; 2], to: [f64; 2], wanted: f64, floor: f64) -> Option<f64> {
+        let fits = |z: f64| self.judge_way([from[0], from[1], z], [to[0], to[1], z]).is_ok();
+        if fits(wanted) {
+            return Some(wanted);
+        }
+        if !fits(floor) {
+            return None;
+        }
+        let mut z = floor;
+        let mut step = wanted - floor;
+        for _ in 0..HALVINGS {
+            step *= 0.5;
+            if fits(z + step) {
+                z += step;
+            }
+        }
+        Some(z)
+    }
+
     /// How high the head can be lifted from a place, by no more than this; never lower than it is.
     pub(crate) fn lifted(&self, at: [f64; 3], by: f64) -> f64 {
         let [x, y, z] = at;
@@ -180,6 +201,17 @@ mod tests {
         let z = reach.lifted([100.0, 0.0, 200.0], 100.0);
         assert!(reach.judge([100.0, 0.0, 200.0], [100.0, 0.0, z]).is_ok());
         assert!(reach.judge([100.0, 0.0, 200.0], [100.0, 0.0, z + 0.01]).is_err());
+    }
+
+    #[test]
+    fn the_way_across_is_as_high_as_it_goes() {
+        let reach = delta();
+        let [home, place] = [[0.0, 0.0], [80.0, 60.0]];
+        assert_eq!(reach.across(home, place, 20.0, 10.0), Some(20.0));
+        let z = reach.across(home, place, 300.0, 10.0).unwrap();
+        assert!(z > 200.0 && reach.judge([0.0, 0.0, z], [80.0, 60.0, z]).is_ok());
+        assert!(reach.judge([0.0, 0.0, z + 0.01], [80.0, 60.0, z + 0.01]).is_err());
+        assert_eq!(reach.across(home, place, 300.0, 299.0), None);
     }
 
     #[test]

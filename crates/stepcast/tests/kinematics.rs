@@ -178,3 +178,15 @@ fn what_cannot_be_reached_is_refused_with_its_line() {
         assert!(error.to_string().contains(words), "{error:#}");
     }
 }
+
+#[test]
+fn a_print_begins_with_any_line() {
+    for kinematics in ["corexy", "corexz", "delta"] {
+        // On a delta the head comes from its top, from where nothing but the middle can be reached.
+        let print = machine(kinematics).1.replace("G28 X\n", "");
+        let report = simulate("begins", kinematics, &print, &["--start-line", "6"]);
+        assert_eq!(report["result"], "done", "{kinematics}: {report:#}");
+        assert!(seconds(&report, "path_error_max_mm") <= 0.025, "{kinematics}: {report:#}");
+        assert!(all_motors(&report, |motor| motor["lost_steps"] == 0), "{kinematics}: {report:#}");
+    }
+}

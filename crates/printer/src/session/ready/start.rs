@@ -180,7 +180,7 @@ impl Ready {
         let place = |[x, y, z, _]: [f64; 4]| [x, y, z];
         Reach::new(&self.config)
             .judge_way(place(self.planner.position()), place(to))
-            .map_err(|detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail).ending(Ended::Job))?;
+            .map_err(|detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail))?;
         self.planner.push_raw_move(to, feed, LineNumber(0))
     }
 
@@ -197,11 +197,13 @@ impl Ready {
             self.events.push(Event::Message(text.into()));
             return Ok(());
         };
-        let up = z.max(start.clear_z);
+        let up = self.across([x, y], z.max(start.clear_z), start.clear_z)?;
+        let [here_x, here_y, ..] = self.planner.position();
         let retraction = self.config.firmware_retraction.as_ref();
         let (pull_mm, speed) =
             retraction.map_or((PULL_MM, PULL_SPEED), |it| (it.retract_length.0, it.retract_speed));
         let pulled = pull_mm.max(start.retracted).min(extruder.max_extrude_only_distance.0);
+        self.go([here_x, here_y, up, e], RETURN_FEED)?;
         self.go([x, y, up, e], RETURN_FEED)?;
         self.go([x, y, up, e + prime_mm], PRIME_SPEED)?;
         self.go([x, y, up, e + prime_mm - pulled], speed)?;
@@ -231,7 +233,8 @@ impl Ready {
         let Some(paused) = self.job.as_ref().and_then(|job| job.paused.as_ref()) else { return Ok(()) };
         let [x, y, z, _] = paused.position;
         let [here_x, here_y, here_z, e] = self.planner.position();
-        let up = here_z.max(z).max(start.clear_z);
+        let floor = z.max(start.clear_z);
+        let up = self.across([x, y], here_z.max(floor), floor)?;
         for to in [[here_x, here_y, up, e], [x, y, up, e], [x, y, z, e]] {
             self.go(to, RETURN_FEED)?;
         }
