@@ -27,7 +27,7 @@ pub use action::{
     PauseReason, Position, ShaperName, VelocityLimit, Wait,
 };
 pub use annotation::{Annotation, Feature};
-pub use arc::{Arc, ArcError, CHORD_TOLERANCE, CHORD_TOLERANCE_MIN, Chords, Plane};
+pub use arc::{Arc, ArcError, ArcPiece, CHORD_TOLERANCE, CHORD_TOLERANCE_MIN, Chords, Plane};
 pub use diagnostic::{Diagnostic, DiagnosticCode, Severity};
 pub use interpreter::{FirmwareRetraction, Interpreter, Settings};
 pub use lines::{LINE_BYTES_MAX, Line, LineNumber, Lines};

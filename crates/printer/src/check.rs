@@ -6,8 +6,8 @@
 //! costs no more memory than one with a thousand.
 
 use gcode::{
-    Action, CHORD_TOLERANCE, Diagnostic, Heater, Interpreter, LineNumber, Lines, Move, Settings, Severity,
-    VelocityLimit,
+    Action, Arc, CHORD_TOLERANCE, Diagnostic, Heater, Interpreter, LineNumber, Lines, Move, Settings,
+    Severity, VelocityLimit,
 };
 use motion::Limits;
 use units::Celsius;
@@ -220,7 +220,7 @@ impl Checker {
     fn act(&mut self, action: &Action, line: LineNumber) {
         match *action {
             Action::Move(ref mv) => self.judge(mv),
-            Action::Arc(ref arc) => arc.chords(CHORD_TOLERANCE).for_each(|chord| self.judge(&chord)),
+            Action::Arc(ref arc) => self.judge_arc(arc),
             Action::Home { x, y, z } => self.home([x, y, z]),
             Action::SetTemperature { heater, target, .. } => self.target(heater, target, line),
             Action::WaitForTemperature { heater, .. } => _ = self.limits_of(heater, line),
@@ -263,6 +263,20 @@ impl Checker {
         if let Err(error) = allowed.and(possible) {
             self.keep(error);
         }
+    }
+
+    /// An arc may lead out of the machine between two places that are in it.
+    fn judge_arc(&mut self, arc: &Arc) {
+        if let Some(guard) = &self.guard {
+            let reach = |to: gcode::Position| {
+                let to = gcode::Position { e: arc.from.e, ..to };
+                guard.judge(&Move { line: arc.line, from: arc.from, to, feed: arc.feed, rapid: false })
+            };
+            if let Err(error) = arc.extremes().try_for_each(reach) {
+                self.keep(error);
+            }
+        }
+        arc.chords(CHORD_TOLERANCE).for_each(|chord| self.judge(&chord));
     }
 
     fn home(&mut self, axes: [bool; 3]) {

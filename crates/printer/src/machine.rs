@@ -112,6 +112,12 @@ pub fn step_distances(config: &PrinterConfig) -> [Mm; MOTORS] {
     [x, y, z, e]
 }
 
+/// The section of the filament in mm²; 1.75 mm thick where the machine file has no extruder.
+pub fn filament_area_mm2(config: &PrinterConfig) -> f64 {
+    const USUAL_MM2: f64 = core::f64::consts::PI * 1.75 * 1.75 / 4.0;
+    config.extruder.as_ref().map_or(USUAL_MM2, crate::config::ExtruderConfig::filament_area_mm2)
+}
+
 /// The speed of each motor's axis at which it makes as many steps as can be told apart: pulses and the gaps between
 /// them last for `step_pulse_duration` at least.
 pub fn motor_speeds_max(config: &PrinterConfig, clock: Hertz) -> [MmPerS; MOTORS] {

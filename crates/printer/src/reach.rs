@@ -2,6 +2,9 @@
 //!
 //! Knows positions, no moves of filament and no speeds. Machine coordinates in mm.
 
+use core::f64::consts::TAU;
+
+use motion::Bend;
 use steps::Delta;
 
 use crate::config::{Kinematics, PrinterConfig};
@@ -10,6 +13,8 @@ use crate::config::{Kinematics, PrinterConfig};
 pub(crate) const AXES: [&str; 3] = ["X", "Y", "Z"];
 /// How far beyond a limit still counts as on it, in mm: the dust of decimal arithmetic, far below a step.
 const LIMIT_SLACK_MM: f64 = 1e-6;
+/// An upright piece of an arc is looked at in so many places.
+const UPRIGHT_PLACES: u32 = 32;
 /// Halvings of a lift that does not fit: a millionth of it is left.
 const HALVINGS: u32 = 20;
 
@@ -77,6 +82,45 @@ impl Reach {
             }
         }
         Ok(())
+    }
+
+    /// Whether a piece of an arc whose chord is within reach stays there too: it bulges out of a round bed, or towards a
+    /// tower. What an axis has to say of it is judged elsewhere.
+    pub(crate) fn judge_bend(&self, bend: &Bend, from: [f64; 3], to: [f64; 3]) -> Result<(), String> {
+        let Some(towers) = &self.towers else { return Ok(()) };
+        let [first, second, normal] = bend.axes();
+        let place = |share: f64| {
+            let mut at = [0.0; 3];
+            (at[first], at[second]) = (bend.turning(0, share), bend.turning(1, share));
+            at[normal] = from[normal] + (to[normal] - from[normal]) * share;
+            at
+        };
+        if normal != 2 {
+            // An upright one is nowhere farther from its places than the height of the bows between them.
+            let half = 0.5 * bend.turn / f64::from(UPRIGHT_PLACES);
+            let bow = bend.radius() * (1.0 - libm::cos(half));
+            return (0..=UPRIGHT_PLACES).try_for_each(|part| {
+                let [x, y, z] = place(f64::from(part) / f64::from(UPRIGHT_PLACES));
+                self.judge_way([x, y, z + bow], [x, y, z + bow])
+            });
+        }
+        let z = from[2].max(to[2]);
+        let [x, y] = bend.centre;
+        let outward = core::iter::once(libm::atan2(y, x));
+        let to_towers = (0..3).map(|tower| {
+            let [foot_x, foot_y] = towers.delta.foot(tower);
+            libm::atan2(foot_y - y, foot_x - x)
+        });
+        outward.chain(to_towers).try_for_each(|angle| {
+            // Counted on in the direction of the arc, from its start.
+            let ahead = (angle - bend.start_angle) * bend.turn.signum();
+            let share = (ahead - TAU * libm::floor(ahead / TAU)) / bend.turn.abs();
+            if share >= 1.0 || share.is_nan() {
+                return Ok(());
+            }
+            let [x, y, _] = place(share);
+            self.judge_way([x, y, z], [x, y, z])
+        })
     }
 
     /// How high the way across from one place to another can be: as high as wanted, or as high as it goes without coming

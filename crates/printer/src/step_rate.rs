@@ -5,7 +5,7 @@
 
 use gcode::LineNumber;
 use motion::{Limits, PlannedMove};
-use steps::{Geometry, Kinematics as _};
+use steps::{Geometry, Kinematics as _, STRETCH_RATIO_MAX};
 use units::{Hertz, MmPerS, Seconds};
 
 use crate::{
@@ -90,7 +90,7 @@ impl StepRates {
         line: LineNumber,
     ) -> Result<(), PrinterError> {
         let delta: [f64; MOTORS] = core::array::from_fn(|motor| to[motor] - from[motor]);
-        let ways = self.ways(delta, from, to);
+        let ways = self.ways(delta, from, to, false);
         let travel = delta[..EXTRUDER].iter().map(|d| d * d).sum::<f64>().sqrt();
         let (length, speed, motors) = if travel > 0.0 {
             (travel, feed.min(limits.max_velocity), 0..EXTRUDER)
@@ -115,7 +115,7 @@ impl StepRates {
         let delta: [f64; MOTORS] = core::array::from_fn(|motor| to[motor] - from[motor]);
         let travel = delta[..EXTRUDER].iter().map(|d| d * d).sum::<f64>().sqrt();
         let length = if travel > 0.0 { travel } else { delta[EXTRUDER].abs() };
-        let ways = self.ways(delta, from, to);
+        let ways = self.ways(delta, from, to, false);
         (0..MOTORS)
             .filter(|&motor| ways[motor] > 0.0)
             .fold(feed, |feed, motor| feed.min(self.speed_max[motor] * (length / ways[motor])))
@@ -123,7 +123,7 @@ impl StepRates {
 
     /// How far each motor goes where the axes go this way, from one place to another: of a delta's towers no less than
     /// the farthest that they would go in any part of it, scaled up.
-    fn ways(&self, way: [f64; MOTORS], from: Position, to: Position) -> [f64; MOTORS] {
+    fn ways(&self, way: [f64; MOTORS], from: Position, to: Position, is_bent: bool) -> [f64; MOTORS] {
         match &self.geometry {
             Geometry::Cartesian => way.map(f64::abs),
             Geometry::Linear(linear) => {
@@ -134,7 +134,9 @@ impl StepRates {
                     return way[EXTRUDER].abs();
                 }
                 let [at_start, at_end] = [from, to].map(|at| delta.stretch_ratio(motor, at[0], at[1]));
-                way[2].abs() + libm::hypot(way[0], way[1]) * at_start.max(at_end)
+                // Between its ends an arc may be farther from a tower than there.
+                let ratio = if is_bent { STRETCH_RATIO_MAX } else { at_start.max(at_end) };
+                way[2].abs() + libm::hypot(way[0], way[1]) * ratio
             }),
         }
     }
@@ -171,10 +173,12 @@ impl StepRates {
     /// Refuses a planned move in which a motor would have to step faster than it can.
     /// Where it draws, pressure advance adds to the filament's speed.
     pub fn judge_planned(&self, planned: &PlannedMove) -> Result<(), PrinterError> {
-        let draws =
-            planned.direction[EXTRUDER] > 0.0 && (planned.direction[0] != 0.0 || planned.direction[1] != 0.0);
-        let shares = self.ways(planned.direction, planned.from, planned.to);
-        for (motor, share) in shares.into_iter().enumerate() {
+        let draws = planned.direction[EXTRUDER] > 0.0
+            && (planned.bend.is_some() || planned.direction[0] != 0.0 || planned.direction[1] != 0.0);
+        let shares = |direction| self.ways(direction, planned.from, planned.to, planned.bend.is_some());
+        for (motor, share) in
+            planned.directions().flat_map(|direction| shares(direction).into_iter().enumerate())
+        {
             let added = if draws && motor == EXTRUDER { self.added(planned) } else { 0.0 };
             let speed = MmPerS((planned.cruise_velocity + added) * share);
             if speed > self.speed_max[motor] * (1.0 + SLACK) {

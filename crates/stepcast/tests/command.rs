@@ -247,3 +247,51 @@ fn a_print_begins_with_a_line_or_a_layer() {
     let both = ["simulate", "a", "--config", "b", "--start-line", "3", "--start-layer", "2"];
     assert_eq!(stepcast(&both).status.code(), Some(2));
 }
+
+#[test]
+fn a_plan_tells_features_layers_and_the_axes_over_time() {
+    let file = File::new("trace.gcode", format!(";TYPE:External perimeter\n{PRINT}"));
+    let table = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("trace.csv");
+    let [path, csv] = [&file.0, &table].map(|path| path.to_str().expect("a path in UTF-8"));
+    let plan = ["plan", path, "--config", MACHINE, "--json", "--layers", "--trace", csv];
+    let report = json(&stepcast(&[&plan[..], &["--trace-step-ms", "2"]].concat()));
+    let sum = |list: &str| -> f64 {
+        let list = report[list].as_array().expect("a list");
+        list.iter().map(|one| one["time_s"].as_f64().expect("a time")).sum()
+    };
+    let time = report["print_time_s"].as_f64().expect("a time");
+    assert!((sum("features") - time).abs() < 1e-6 && (sum("layers") - time).abs() < 1e-6, "{report:#}");
+    let names: Vec<_> = report["features"].as_array().unwrap().iter().map(|one| &one["name"]).collect();
+    assert_eq!(names, ["outer_wall", "travel", "retraction"]);
+    let text = fs::read_to_string(&table).expect("the table");
+    let rows: Vec<Vec<f64>> =
+        text.lines().skip(1).map(|row| row.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
+    assert!(text.starts_with("time_s,x_mm,y_mm,z_mm,e_mm,x_mm_s,"));
+    assert!((rows.len() as f64 - time / 0.002).abs() <= 1.0 && rows.iter().all(|row| row.len() == 13));
+    // From place to place at the speeds between, but for what accelerations do in 2 ms.
+    for pair in rows.windows(2) {
+        for axis in 1..5 {
+            let (way, mean) = (pair[1][axis] - pair[0][axis], 0.5 * (pair[0][axis + 4] + pair[1][axis + 4]));
+            assert!((way - 0.002 * mean).abs() < 0.02, "{pair:?}");
+        }
+    }
+    let unwritable = stepcast(&["plan", path, "--config", MACHINE, "--trace", "/nowhere/trace.csv"]);
+    assert_eq!(unwritable.status.code(), Some(1));
+    assert!(stderr(&unwritable).contains("/nowhere/trace.csv"));
+}
+
+#[test]
+fn arcs_are_drawn_as_arcs() {
+    let arcs = "M83\nG3 X50 Y50 I10 J0 E2 F9000\nG2 X70 Y50 R10 E1\nG1 X75 E0.1\nG3 X80 Y55 I0 J5 E0.3\nG1 Y70\nG18\n\
+        G3 X90 Z0.3 I5 K0 F600\nG17\nG3 X90 Y70 Z5 I-4 J0 P4 E0.5 F3000\nG2 X90.3 Y70 I0.15 J0 E0.05\nG91\nG2 X1 Y1 I1\n\
+        G90\nM82\nG92 E2\n";
+    let print = PRINT.replacen("G3 X60 Y60 I10 J0 E2.6\n", arcs, 1);
+    let (output, report) = simulate(&File::new("arcs.gcode", print), &[]);
+    assert!(output.status.success(), "{report:#}");
+    // Half a step of two axes, and what a step's time may be off.
+    assert!(report["path_error_max_mm"].as_f64().is_some_and(|error| error < 0.013), "{report:#}");
+    for motor in ["stepper_x", "stepper_y", "stepper_z", "extruder"] {
+        let steps = &report["motors"][motor];
+        assert_eq!(steps["planned_steps"], steps["counted_steps"], "{motor}");
+    }
+}

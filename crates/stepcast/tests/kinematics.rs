@@ -15,7 +15,7 @@ const DELTA: &str = include_str!("../../../samples/delta.cfg");
 /// Without heat: straight on, slanted, an arc, and up and down, around the middle of a round bed.
 const PRINT: &str = "G28\nG90\nG1 Z5 F6000\nG1 X-40 Y-30 F9000\nG1 X60 Y-30 F12000\nG1 X60 Y55\nG1 X-20 Y-40\n\
     G2 X30 Y10 I25 J25 F6000\nG1 Z15 F3000\nG1 X-70 Y40 Z8 F9000\nG1 X-70.013 Y40.004\nG28 X\nG1 Z20 F3000\n\
-    G1 X5 Y5 F9000\nG1 X40.5 Y-61.2 Z10\nM84\n";
+    G1 X5 Y5 F9000\nG18\nG3 X15 Z20 I5 K0 F3000\nG17\nG1 X40.5 Y-61.2 Z10\nM84\n";
 
 /// The same on a bed whose corner is at 0.
 fn on_a_square_bed() -> String {
@@ -166,6 +166,12 @@ fn what_cannot_be_reached_is_refused_with_its_line() {
         ("G28\nG90\nG1 Z5 F6000\nG1 X90 Y90\n", 4, "from the middle"),
         ("G28\nG90\nG1 Z299 F6000\nG1 X100 Y0\n", 4, "beyond its endstop"),
         ("G28\nG90\nG1 Z-1 F6000\n", 3, "Z -1.000"),
+        // Its ends and where it is farthest along X and Y are within the round bed, its middle is not.
+        (
+            "G28\nG90\nG1 Z5 F6000\nG1 X89.848 Y53.486\nG3 X53.486 Y89.848 I-39.848 J-3.486\n",
+            5,
+            "from the middle",
+        ),
     ] {
         let report = simulate("refused", "delta", print, &[]);
         assert_eq!(report["result"], "refused", "{report:#}");

@@ -106,6 +106,10 @@ impl Grid {
         let [c1, c2, c3, c4, c5] = segment.powers;
         let peak = if segment.is_quadratic() {
             c1.abs().max((c1 + 2.0 * c2 * t).abs())
+        } else if c4 == 0.0 && c5 == 0.0 {
+            let turn = -c2 / (3.0 * c3);
+            let within = if turn > 0.0 && turn < t { (c1 + c2 * turn).abs() } else { 0.0 };
+            c1.abs().max((c1 + (2.0 * c2 + 3.0 * c3 * t) * t).abs()).max(within)
         } else {
             let rest = [2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5];
             c1.abs() + rest.iter().rev().fold(0.0, |sum, power| (sum + power.abs()) * t)

@@ -377,7 +377,7 @@ proptest! {
         for [x, y, length, start_time, accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, accel] in raw {
             let planned = PlannedMove {
                 tag: 0, from: at, to: [x, y, at[2], at[3] + 1.0], direction: [0.6, 0.8, 0.0, 0.1], length, start_time,
-                accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, end_velocity: 0.0, accel, shape: None,
+                accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, end_velocity: 0.0, accel, shape: None, bend: None,
             };
             if generator.push(&planned).is_ok() {
                 at = planned.to;

@@ -1,6 +1,7 @@
 //! Planned moves in, commands for all motors out, in the order of time.
 
 use crate::advance::Lines;
+use crate::bent::{bent_segments, turning_axis};
 use crate::compressor::{Compressor, gap_min_ticks};
 use crate::crossing::{Grid, Piece, nearest_step};
 use crate::filter::Filter;
@@ -174,6 +175,13 @@ impl<K: Kinematics> StepGenerator<K> {
         self.axes.iter().filter_map(|axis| axis.filter.as_ref())
     }
 
+    /// What the last [`Self::push`] or [`Self::end_run`] has made known of each axis' path, after pressure advance and shaping,
+    /// and the print time up to which all of them are known.
+    pub fn axis_paths(&self) -> (&[Vec<Segment>; AXES], Seconds) {
+        let known = self.axes.iter().map(|axis| axis.known).fold(f64::INFINITY, f64::min);
+        (&self.paths, Seconds(known))
+    }
+
     /// Segments that the filters hold: the most of any, see [`crate::SEGMENTS_HELD_MAX`].
     pub fn segments_held(&self) -> usize {
         self.filters().map(Filter::held).max().unwrap_or(0)
@@ -266,24 +274,32 @@ impl<K: Kinematics> StepGenerator<K> {
 
     /// What becomes known of each axis with a move.
     fn push_to_axes(&mut self, planned: &PlannedMove) {
-        let draws = planned.direction[0] != 0.0 || planned.direction[1] != 0.0;
+        let draws = planned.bend.is_some() || planned.direction[0] != 0.0 || planned.direction[1] != 0.0;
         for (index, (axis, path)) in self.axes.iter_mut().zip(&mut self.paths).enumerate() {
             path.clear();
             let (from, to) = (planned.from[index], planned.to[index]);
+            let turning = turning_axis(planned, index);
+            // An arc's direction in space is that of its chord.
+            let ratio =
+                if planned.bend.is_some() { (to - from) / planned.length } else { planned.direction[index] };
             let Some(filter) = &mut axis.filter else {
                 axis.known = planned.end_time();
-                if from != to {
-                    segments(planned, from, to, planned.direction[index], &mut |segment| path.push(segment));
+                if let Some(turning) = turning {
+                    bent_segments(planned, turning, [from, to], &mut |segment| path.push(segment));
+                } else if from != to {
+                    segments(planned, from, to, ratio, &mut |segment| path.push(segment));
                 }
                 continue;
             };
             let input = filter.path();
             input.rest_until(planned.start_time);
-            if from == to {
+            if let Some(turning) = turning {
+                bent_segments(planned, turning, [from, to], &mut |segment| input.push(segment));
+            } else if from == to {
                 input.rest_at(planned.end_time(), to);
             } else {
                 let has_advance = index == EXTRUDER && draws && to > from;
-                segments(planned, from, to, planned.direction[index], &mut |segment| {
+                segments(planned, from, to, ratio, &mut |segment| {
                     if has_advance {
                         self.advance.apply(&segment, &mut |segment| input.push(segment));
                     } else {

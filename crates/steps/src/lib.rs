@@ -15,6 +15,7 @@
 //! straight lines between data ranges", 1981).
 
 mod advance;
+mod bent;
 mod compressor;
 mod crossing;
 mod delayed_sum;
@@ -84,6 +85,8 @@ pub fn step_rate_max(clock: Hertz) -> f64 {
     ticks_per_s / compressor::gap_min_ticks(ticks_per_s)
 }
 
+#[cfg(test)]
+mod bent_tests;
 #[cfg(test)]
 mod filter_tests;
 #[cfg(test)]

@@ -93,7 +93,9 @@ impl DeltaConfig {
     fn home(&self) -> Option<[f64; 3]> {
         let [a, b, c] = self.endstops().map(|at| at.0);
         let [x, y, z, _] = self.delta()?.position(&[a, b, c, 0.0])?;
-        Some([x, y, z])
+        // What rounding leaves is no place beside the middle.
+        let whole = |at: f64| if at.abs() < 1e-9 { 0.0 } else { at };
+        Some([whole(x), whole(y), z])
     }
 }
 

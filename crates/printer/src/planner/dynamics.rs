@@ -5,10 +5,11 @@
 
 use std::collections::VecDeque;
 
-use gcode::{AxisShaper, InputShaper};
+use gcode::{Action, AxisShaper, InputShaper};
 use steps::{Advance, Filters, Geometry, StepGenerator};
 use units::Seconds;
 
+use super::Planner;
 use crate::config::{AxisShaperConfig, PrinterConfig};
 
 /// How the paths of the axes are changed before they become steps.
@@ -120,6 +121,24 @@ impl Course {
     pub(super) fn planned(&mut self, moves: u64, generator: &mut StepGenerator<Geometry>) {
         while let Some((_, advance)) = self.advances.pop_front_if(|(after, _)| *after <= moves) {
             generator.set_advance(&advance);
+        }
+    }
+}
+
+impl Planner {
+    /// Takes an advance or a shaper; one that changes the filters lets the machine come to rest first.
+    pub(super) fn set_dynamics(&mut self, action: &Action) {
+        let read = self.course.read();
+        let dynamics = match action {
+            Action::PressureAdvance { advance, smooth_time } => read.with_advance(*advance, *smooth_time),
+            Action::InputShaper(change) => read.with_shaper(change),
+            _ => return,
+        };
+        self.step_rates.set_advance(dynamics.effective_advance().slope_max());
+        if self.course.set(dynamics, self.moves_pushed) {
+            self.finish_run();
+        } else if self.moves_planned == self.moves_pushed {
+            self.course.planned(self.moves_planned, &mut self.generator);
         }
     }
 }

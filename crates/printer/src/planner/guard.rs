@@ -3,7 +3,8 @@
 //! Knows positions and limits, not speeds (the look-ahead keeps those) and not temperatures (it is told whether the
 //! nozzle may extrude). Positions are machine coordinates in mm, the extruder in mm of filament.
 
-use gcode::Move;
+use gcode::{LineNumber, Move};
+use motion::Bend;
 
 use crate::{
     config::PrinterConfig,
@@ -86,6 +87,19 @@ impl Guard {
             self.reach.judge_way(from, to).map_err(out_of_range)?;
         }
         self.judge_extrusion(mv)
+    }
+
+    /// Why this piece of an arc may not be made, where its straight one may: it bulges.
+    pub(crate) fn judge_bend(
+        &self,
+        bend: &Bend,
+        from: [f64; 4],
+        to: [f64; 4],
+        line: LineNumber,
+    ) -> Result<(), PrinterError> {
+        self.reach
+            .judge_bend(bend, [from[0], from[1], from[2]], [to[0], to[1], to[2]])
+            .map_err(|detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(line.0))
     }
 
     fn judge_extrusion(&self, mv: &Move) -> Result<(), PrinterError> {

@@ -5,7 +5,12 @@
 //! knows no host time and no board clock: times are seconds, and step commands are ticks, from the start of a **run of
 //! motion**, which is a stretch that begins and ends at rest.
 
+#[cfg(test)]
+mod arc_tests;
 mod dynamics;
+#[cfg(test)]
+mod estimate_tests;
+mod estimates;
 #[cfg(test)]
 mod extrusion_tests;
 mod guard;
@@ -17,26 +22,31 @@ mod skip;
 mod source;
 #[cfg(test)]
 mod tests;
+mod trace;
 
 use std::collections::VecDeque;
 
 use gcode::{Action, LineNumber, Wait};
-use motion::{Bound, Limits, LookAhead, MoveRequest, PlannedMove};
+use motion::{Bend, Bound, Limits, LookAhead, MoveRequest, PlannedMove};
 use steps::{Geometry, PushError, StepGenerator};
 use units::{Hertz, MmPerS, Seconds, Ticks};
 
 use dynamics::Course;
+pub use estimates::{Estimates, FEATURE_NAMES, LayerTotal, MoveEstimate, MoveKind, Total};
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
 use paces::Paces;
-pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanStream, Ramps};
+pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanSink, PlanStream, Ramps};
 pub(crate) use skip::{Skip, Skipped};
 pub(crate) use source::Next;
 pub use source::{SOURCE_BYTES_MAX, Source};
+use trace::Trace;
+pub use trace::TraceSample;
 
 pub use crate::pace::Pace;
 
 use crate::{
+    arcs,
     config::{PrinterConfig, UnreachableSpeed},
     error::{ErrorCode, PrinterError},
     machine::{self, EXTRUDER},
@@ -110,6 +120,8 @@ pub struct Planner {
     homes_together: bool,
     /// What the plan is held against, where somebody wants to know.
     bound: Option<Box<Bound>>,
+    /// Where somebody wants to see the axes' paths.
+    trace: Option<Box<Trace>>,
 }
 
 impl Planner {
@@ -142,6 +154,7 @@ impl Planner {
             is_broken: false,
             homes_together: machine::homed_together(config, [true, false, false]) == [true; 3],
             bound: None,
+            trace: None,
         })
     }
 
@@ -280,7 +293,7 @@ impl Planner {
         feed: MmPerS,
         line: LineNumber,
     ) -> Result<(), PrinterError> {
-        self.push(to, feed, line, Pace::default())
+        self.push(to, None, feed, line, Pace::default())
     }
 
     /// The next item of the plan.
@@ -299,6 +312,7 @@ impl Planner {
             match self.run {
                 Run::Ending => {
                     self.generator.end_run().map_err(|error| self.unsteppable(error, None))?;
+                    self.trace_paths();
                     self.run = Run::Draining;
                     continue;
                 }
@@ -318,8 +332,8 @@ impl Planner {
                 self.finish_run();
                 continue;
             }
-            if let Some(chord) = source.next_chord() {
-                self.judge_and_push(&chord, source)?;
+            if let Some(piece) = source.next_piece() {
+                self.judge_and_push(&piece.chord, Some(&arcs::bend(&piece)), source)?;
                 continue;
             }
             match source.next() {
@@ -337,8 +351,11 @@ impl Planner {
     fn act(&mut self, action: Action, source: &mut Source) -> Result<(), PrinterError> {
         let line = source.line();
         match action {
-            Action::Move(mv) => self.judge_and_push(&mv, source)?,
-            Action::Arc(arc) => source.draw(&arc),
+            Action::Move(mv) => self.judge_and_push(&mv, None, source)?,
+            Action::Arc(arc) => {
+                self.judge_arc(&arc)?;
+                source.draw(&arc);
+            }
             Action::VelocityLimit(limit) => self.limit(limit),
             Action::SetTemperature { heater, target, wait: Wait::No } => {
                 self.defer(line, TimedAction::SetTemperature { heater, target });
@@ -386,22 +403,6 @@ impl Planner {
         Ok(())
     }
 
-    /// Takes an advance or a shaper; one that changes the filters lets the machine come to rest first.
-    fn set_dynamics(&mut self, action: &Action) {
-        let read = self.course.read();
-        let dynamics = match action {
-            Action::PressureAdvance { advance, smooth_time } => read.with_advance(*advance, *smooth_time),
-            Action::InputShaper(change) => read.with_shaper(change),
-            _ => return,
-        };
-        self.step_rates.set_advance(dynamics.effective_advance().slope_max());
-        if self.course.set(dynamics, self.moves_pushed) {
-            self.finish_run();
-        } else if self.moves_planned == self.moves_pushed {
-            self.course.planned(self.moves_planned, &mut self.generator);
-        }
-    }
-
     /// Attaches an action to the end of the moves read so far.
     fn defer(&mut self, line: LineNumber, action: TimedAction) {
         if self.moves_planned == self.moves_pushed {
@@ -417,11 +418,20 @@ impl Planner {
         }
     }
 
-    fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber, pace: Pace) -> Result<(), PrinterError> {
+    fn push(
+        &mut self,
+        to: Position,
+        bend: Option<&Bend>,
+        feed: MmPerS,
+        line: LineNumber,
+        pace: Pace,
+    ) -> Result<(), PrinterError> {
         if to == self.position {
             return Ok(());
         }
-        self.step_rates.judge_request(self.position, to, feed, &self.limits, line)?;
+        for end in arcs::straight_ends(self.position, to, bend) {
+            self.step_rates.judge_request(self.position, end, feed, &self.limits, line)?;
+        }
         if self.run == Run::None {
             self.look_ahead.begin_run();
             self.course.begin_run(&mut self.generator);
@@ -435,7 +445,7 @@ impl Planner {
         }
         let before = self.look_ahead.len();
         let request = MoveRequest { from: self.position, to, feed, tag: line.0 };
-        self.look_ahead.push(&request).map_err(|error| wrong(&error).at_line(line.0))?;
+        self.look_ahead.push_along(&request, bend).map_err(|error| wrong(&error).at_line(line.0))?;
         // The look-ahead drops moves without length.
         let pushed = (self.look_ahead.len() - before) as u64;
         if pushed > 0 {
@@ -444,7 +454,7 @@ impl Planner {
         self.moves_pushed += pushed;
         self.position = to;
         if let Some(bound) = &mut self.bound {
-            bound.push(&request, &self.limits);
+            bound.push_along(&request, bend, &self.limits);
         }
         Ok(())
     }
@@ -466,6 +476,7 @@ impl Planner {
             return Err(error);
         }
         self.generator.push(&planned).map_err(|error| self.unsteppable(error, Some(planned.tag)))?;
+        self.trace_paths();
         self.planned_until = Seconds(planned.end_time());
         let pace = self.paces.take(self.moves_planned);
         self.moves_planned += 1;

@@ -1,7 +1,7 @@
 //! One stream of G-code with its own modal state: a job's file, or what a user types.
 
 use gcode::{
-    Action, Arc, CHORD_TOLERANCE, Chords, Diagnostic, Interpreter, LineNumber, Lines, Move, Settings,
+    Action, Arc, ArcPiece, CHORD_TOLERANCE, Chords, Diagnostic, Interpreter, LineNumber, Lines, Settings,
 };
 use units::{Mm, MmPerS};
 
@@ -21,7 +21,7 @@ pub struct Source {
     actions: Vec<Action>,
     next_action: usize,
     diagnostics: Vec<Diagnostic>,
-    /// The chords of an arc that is being drawn, one at a time: a large arc has tens of thousands.
+    /// The pieces of an arc that is being drawn, one at a time: a large arc has tens of thousands.
     chords: Option<Chords>,
     /// The toolhead's extruder position less the interpreter's, which counts from its own start, in mm of filament.
     pub(super) e_offset: f64,
@@ -148,12 +148,12 @@ impl Source {
     }
 
     /// The next piece of the arc that is being drawn.
-    pub(super) fn next_chord(&mut self) -> Option<Move> {
-        let chord = self.chords.as_mut()?.next();
-        if chord.is_none() {
+    pub(super) fn next_piece(&mut self) -> Option<ArcPiece> {
+        let piece = self.chords.as_mut()?.next_piece();
+        if piece.is_none() {
             self.chords = None;
         }
-        chord
+        piece
     }
 
     /// The next thing in the stream.

@@ -20,6 +20,8 @@ const SIZE_SHIFT: u32 = 20;
 const FEATURE_SHIFT: u32 = 20;
 const FEATURE_MASK: u32 = 31;
 const TOOL_SHIFT: u32 = 20;
+/// The feature before a file names one.
+pub const FEATURE_UNNAMED: u8 = 16;
 /// How many features have a number.
 pub const FEATURES: usize = 17;
 

@@ -5,7 +5,9 @@
 
 use std::collections::VecDeque;
 
-use gcode::{Action, Arc, CHORD_TOLERANCE, Chords, Interpreter, Lines, Move, Settings};
+use gcode::{Action, CHORD_TOLERANCE, Chords, Interpreter, Lines, Move, Settings};
+
+use super::arc_way::ArcWay;
 
 /// How far a move's end may be from the file's, in mm: the dust of arithmetic, far below a step.
 const SAME_PLACE_MM: f64 = 1e-6;
@@ -26,19 +28,19 @@ impl MoreGcode for crate::input::Input {
     }
 }
 
-/// A straight piece of the path.
+/// A piece of the path: a move of the look-ahead's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Piece {
     pub(crate) line: u32,
     pub(crate) from: [f64; 4],
     pub(crate) to: [f64; 4],
-    /// How far the true line, an arc, bulges from this straight one.
-    pub(crate) bulge_mm: f64,
+    /// The way between its ends, where it is not straight.
+    pub(crate) arc: Option<ArcWay>,
 }
 
 impl Piece {
-    fn new(mv: &Move, bulge_mm: f64) -> Self {
-        Self { line: mv.line.0, from: mv.from.to_array(), to: mv.to.to_array(), bulge_mm }
+    fn new(mv: &Move, arc: Option<ArcWay>) -> Self {
+        Self { line: mv.line.0, from: mv.from.to_array(), to: mv.to.to_array(), arc }
     }
 
     /// Whether it moves anything by more than dust.
@@ -56,8 +58,8 @@ pub(crate) struct GcodePath<R> {
     next_action: usize,
     /// The line that they are of.
     line: u32,
-    /// The arc that is being flattened.
-    chords: Option<(Chords, Arc)>,
+    /// The arc that is being cut into pieces.
+    chords: Option<Chords>,
     homed: VecDeque<(usize, f64)>,
     /// Lines before this one are read, not made; where axes are once they are homed there.
     begins: (u32, [f64; AXES]),
@@ -143,9 +145,9 @@ impl<R: MoreGcode> GcodePath<R> {
 
     fn next(&mut self) -> anyhow::Result<Option<Piece>> {
         loop {
-            if let Some((chords, arc)) = &mut self.chords {
-                if let Some(chord) = chords.next() {
-                    return Ok(Some(Piece::new(&chord, sagitta(arc, &chord))));
+            if let Some(chords) = &mut self.chords {
+                if let Some(piece) = chords.next_piece() {
+                    return Ok(Some(Piece::new(&piece.chord, Some(ArcWay::new(&piece)))));
                 }
                 self.chords = None;
             }
@@ -157,8 +159,8 @@ impl<R: MoreGcode> GcodePath<R> {
                     continue;
                 }
                 match action {
-                    Action::Move(mv) => return Ok(Some(Piece::new(&mv, 0.0))),
-                    Action::Arc(arc) => self.chords = Some((arc.chords(CHORD_TOLERANCE), arc)),
+                    Action::Move(mv) => return Ok(Some(Piece::new(&mv, None))),
+                    Action::Arc(arc) => self.chords = Some(arc.chords(CHORD_TOLERANCE)),
                     Action::Home { x, y, z } => self.home([x, y, z])?,
                     Action::Cancel => self.ended = true,
                     Action::PressureAdvance { .. } | Action::InputShaper(_) => self.filters = true,
@@ -221,16 +223,6 @@ impl<R: MoreGcode> GcodePath<R> {
     }
 }
 
-/// How far an arc's chord is from the arc in its middle.
-fn sagitta(arc: &Arc, chord: &Move) -> f64 {
-    let [first, second, _] = arc.plane.axes();
-    let (from, to) = (chord.from.to_array(), chord.to.to_array());
-    let [across, along] = [to[first] - from[first], to[second] - from[second]];
-    let half = (across * across + along * along).sqrt() / 2.0;
-    let radius = arc.radii().into_iter().fold(0.0, f64::max);
-    if half >= radius { radius } else { radius - (radius * radius - half * half).sqrt() }
-}
-
 fn place([x, y, z, e]: [f64; 4]) -> String {
     format!("X{x:.4} Y{y:.4} Z{z:.4} (filament {e:.4})")
 }
@@ -264,7 +256,7 @@ mod tests {
             path.homed(axis, 0.0);
         }
         let first = path.take(3, [0.0; 4], [10.0, 0.0, 0.0, 0.0]).unwrap();
-        assert_eq!((first.line, first.to[0], first.bulge_mm), (3, 10.0, 0.0));
+        assert_eq!((first.line, first.to[0], first.arc), (3, 10.0, None));
         // Line 4 leads nowhere and is passed over. The filament counts by its difference.
         path.take(6, [10.0, 0.0, 0.0, 100.0], [10.0, 5.0, 0.0, 100.5]).unwrap();
         path.finish().unwrap();
@@ -306,12 +298,14 @@ mod tests {
     }
 
     #[test]
-    fn arcs_come_as_chords_with_their_bulge() {
+    fn arcs_come_in_pieces_of_themselves() {
         let mut path = path("G1 X10 F600\nG3 X-10 Y0 I-10 J0\n");
         path.take(1, [0.0; 4], [10.0, 0.0, 0.0, 0.0]).unwrap();
         let mut count = 0;
         while let Some(piece) = path.next().unwrap() {
-            assert!(piece.bulge_mm > 0.0 && piece.bulge_mm <= CHORD_TOLERANCE.0 + 1e-9, "{piece:?}");
+            let middle = [0, 1].map(|axis| 0.5 * (piece.from[axis] + piece.to[axis]));
+            let bulge = piece.arc.unwrap().distance_squared([middle[0], middle[1], 0.0], 0.5).sqrt();
+            assert!(bulge > 0.0 && bulge <= CHORD_TOLERANCE.0 + 1e-9, "{piece:?}");
             count += 1;
         }
         assert!(count > 30);

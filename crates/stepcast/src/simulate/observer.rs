@@ -14,6 +14,7 @@ use units::{Seconds, Ticks};
 use virtual_printer::{Gantry, VirtualPrinter};
 
 use super::{
+    arc_way::ArcWay,
     gcode_path::{GcodePath, Piece},
     path_check::Span,
     report::Homing,
@@ -253,11 +254,7 @@ impl Observer {
                 tally.path.set_position(EXTRUDER, from[EXTRUDER]);
             }
         }
-        if self.aside.is_none() {
-            self.plan_steps(scheduled);
-            self.end = Some(to);
-        }
-        let mut piece = Piece { line, from, to, bulge_mm: 0.0 };
+        let mut piece = Piece { line, from, to, arc: None };
         if !homing {
             self.moves += 1;
             if line > 0 && self.mismatch.is_none() {
@@ -265,14 +262,17 @@ impl Observer {
                     Ok(found) => {
                         piece.from[..EXTRUDER].copy_from_slice(&found.from[..EXTRUDER]);
                         piece.to[..EXTRUDER].copy_from_slice(&found.to[..EXTRUDER]);
-                        piece.bulge_mm = found.bulge_mm;
+                        piece.arc = found.arc;
                     }
                     Err(error) => self.mismatch = Some(format!("{error:#}")),
                 }
             }
         }
-        let span =
-            Span { line, start, end, from: piece.from, to: piece.to, bulge_mm: piece.bulge_mm, homing };
+        if self.aside.is_none() {
+            self.plan_steps(scheduled, piece.arc.as_ref());
+            self.end = Some(to);
+        }
+        let span = Span { line, start, end, from: piece.from, to: piece.to, arc: piece.arc, homing };
         if tally.path.expect(&span).is_err() {
             self.mismatch
                 .get_or_insert_with(|| format!("line {line} was planned too far ahead to be followed"));
@@ -325,7 +325,7 @@ impl Observer {
 
     /// Counts the steps of a move: those where it crosses half-way between two positions of a motor. An approach to an
     /// endstop counts by what was made of it, which comes with [`Event::Homed`].
-    fn plan_steps(&mut self, scheduled: &ScheduledMove) {
+    fn plan_steps(&mut self, scheduled: &ScheduledMove, arc: Option<&ArcWay>) {
         let (from, to) = (scheduled.from, scheduled.to);
         // A step or two are no approach: motors that have not stopped together are put right.
         let short = 3.0 * self.step_distance_mm[..EXTRUDER].iter().copied().fold(0.0, f64::max);
@@ -341,7 +341,11 @@ impl Observer {
         let (from, to) = (motors(from), motors(to));
         for motor in 0..MOTORS {
             let distance = self.step_distance_mm[motor];
-            self.planned[motor] += grid(to[motor], distance).abs_diff(grid(from[motor], distance));
+            let along = |way: [f64; 3]| self.gantry.motors(way)[motor];
+            let turn = arc.filter(|_| motor < EXTRUDER).and_then(|arc| arc.turning_point(along));
+            let turn = grid(turn.unwrap_or(from[motor]), distance);
+            self.planned[motor] +=
+                turn.abs_diff(grid(from[motor], distance)) + grid(to[motor], distance).abs_diff(turn);
         }
     }
 

@@ -1,6 +1,6 @@
 //! How far the path that the pulses draw strays from the path that the G-code asks for.
 //!
-//! Both ways and in order. Every pulse: the head's position after it is measured against the line that is being executed
+//! Both ways and in order. Every pulse: the head's position after it is measured against the line, or the arc, that is being executed
 //! at that moment. Every line: its end point is measured against what has been drawn when the line ends. Since a pulse
 //! moves the head by a single step, a head that stays beside the line and comes to its end has drawn all of it.
 //! Near the boundary of two lines a pulse may be early or late by the error that step compression is allowed, so
@@ -13,6 +13,8 @@ use std::collections::VecDeque;
 
 use units::{Hertz, Seconds, Ticks};
 use virtual_printer::Gantry;
+
+use super::arc_way::ArcWay;
 
 /// How early or late a step may come: within this time of a boundary the neighbouring line counts too.
 pub(crate) const BOUNDARY_TOLERANCE: Seconds = Seconds(25e-6);
@@ -36,8 +38,8 @@ pub(crate) struct Span {
     pub(crate) from: [f64; 4],
     /// Where it ends.
     pub(crate) to: [f64; 4],
-    /// How far the G-code's own line bulges from this straight one, for the chords of an arc.
-    pub(crate) bulge_mm: f64,
+    /// The G-code's own way, where it is not straight.
+    pub(crate) arc: Option<ArcWay>,
     /// A homing move: a trigger may cut it short, and positions have no meaning before it ends. Not measured.
     pub(crate) homing: bool,
 }
@@ -62,7 +64,7 @@ struct Segment {
     inverse_length_squared: f64,
     to: [f64; AXES],
     filament: f64,
-    bulge_mm: f64,
+    arc: Option<ArcWay>,
     start: u64,
     end: u64,
     line: u32,
@@ -84,7 +86,7 @@ impl Segment {
             inverse_length_squared: if length_squared > 0.0 { 1.0 / length_squared } else { 0.0 },
             to: [to_x, to_y, to_z],
             filament,
-            bulge_mm: span.bulge_mm,
+            arc: span.arc,
             start: span.start.0,
             end: span.end.0,
             line: span.line,
@@ -98,6 +100,9 @@ impl Segment {
     fn distance_squared(&self, point: [f64; AXES]) -> f64 {
         let offset = minus(point, self.from);
         let along = (dot(offset, self.way) * self.inverse_length_squared).clamp(0.0, 1.0);
+        if let Some(arc) = &self.arc {
+            return arc.distance_squared(point, along);
+        }
         let [x, y, z] = self.way;
         let rest = minus(offset, [along * x, along * y, along * z]);
         dot(rest, rest)
@@ -257,7 +262,7 @@ impl PathCheck {
         if let Some(first) = self.segments.front() {
             let distance_squared = first.distance_squared(self.position);
             if distance_squared > self.threshold_squared && first.measured {
-                let worst = Worst { distance_mm: distance_squared.sqrt() + first.bulge_mm, line: first.line };
+                let worst = Worst { distance_mm: distance_squared.sqrt(), line: first.line };
                 self.note(worst);
             }
         }
@@ -342,7 +347,7 @@ impl PathCheck {
             if !segment.measured {
                 return;
             }
-            let distance_mm = segment.distance_squared(self.position).sqrt() + segment.bulge_mm;
+            let distance_mm = segment.distance_squared(self.position).sqrt();
             if best.is_none_or(|best| distance_mm < best.distance_mm) {
                 best = Some(Worst { distance_mm, line: segment.line });
             }
@@ -378,7 +383,7 @@ impl PathCheck {
                 continue;
             }
             ended.note_end(self.position, self.filament);
-            self.note(Worst { distance_mm: ended.end_squared.sqrt().max(ended.bulge_mm), line: ended.line });
+            self.note(Worst { distance_mm: ended.end_squared.sqrt(), line: ended.line });
             self.filament_worst_mm = self.filament_worst_mm.max(ended.filament_off);
         }
         if any {
@@ -389,14 +394,8 @@ impl PathCheck {
     fn note(&mut self, found: Worst) {
         if found.distance_mm > self.worst.distance_mm {
             self.worst = found;
-            self.set_threshold();
+            self.threshold_squared = found.distance_mm * found.distance_mm;
         }
-    }
-
-    fn set_threshold(&mut self) {
-        let bulge_mm = self.segments.front().map_or(0.0, |first| first.bulge_mm);
-        let threshold_mm = (self.worst.distance_mm - bulge_mm).max(0.0);
-        self.threshold_squared = threshold_mm * threshold_mm;
     }
 
     fn look_at_first(&mut self) {
@@ -407,7 +406,6 @@ impl PathCheck {
             }
             None => self.quiet_ticks = 0,
         }
-        self.set_threshold();
     }
 }
 

@@ -72,6 +72,11 @@ impl Delta {
         (is_sound && area > 1e-3 * radius * radius).then_some(Self { feet, radius })
     }
 
+    /// Where a tower stands, X and Y.
+    pub fn foot(&self, tower: usize) -> [f64; 2] {
+        self.feet[tower].at.into()
+    }
+
     /// How far from the middle the head may be so that no arm lies flatter than [`STRETCH_RATIO_MAX`] allows.
     pub fn reach(&self) -> f64 {
         let flattest = STRETCH_RATIO_MAX / libm::sqrt(1.0 + STRETCH_RATIO_MAX * STRETCH_RATIO_MAX);
