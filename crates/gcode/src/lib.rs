@@ -23,8 +23,8 @@ mod sniff;
 mod words;
 
 pub use action::{
-    Action, AxisShaper, AxisValues, Heater, InputShaper, MachineLimits, Move, ObjectAction, ObjectId,
-    PauseReason, Position, ShaperName, VelocityLimit, Wait,
+    Action, AxisShaper, AxisValues, Heater, InputShaper, MachineLimits, MeshChange, Move, ObjectAction,
+    ObjectId, PauseReason, Position, ShaperName, SkewChange, VelocityLimit, Wait,
 };
 pub use annotation::{Annotation, Feature};
 pub use arc::{Arc, ArcError, ArcPiece, CHORD_TOLERANCE, CHORD_TOLERANCE_MIN, Chords, Plane};

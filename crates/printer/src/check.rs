@@ -18,6 +18,7 @@ use crate::{
     machine,
     planner::{ExtrusionPermit, Guard, PLAN_CLOCK},
     step_rate::StepRates,
+    transform::Transform,
 };
 
 /// The most findings of each kind that are kept; the rest are counted.
@@ -94,6 +95,8 @@ impl Speeds {
 pub struct Checker {
     config: Option<PrinterConfig>,
     guard: Option<Guard>,
+    /// From the file's coordinates to the machine's.
+    transform: Transform,
     speeds: Option<Speeds>,
     lines: Lines,
     interpreter: Interpreter,
@@ -110,6 +113,7 @@ impl Checker {
         Self {
             config: config.cloned(),
             guard: config.map(Guard::new),
+            transform: Transform::default(),
             speeds: config.map(Speeds::new),
             lines: Lines::new(),
             interpreter: Interpreter::new(settings),
@@ -230,6 +234,13 @@ impl Checker {
                 }
             }
             Action::TurnOffHeaters => self.nozzle = Celsius::ZERO,
+            Action::Skew(_) | Action::BedMesh(_) => {
+                if let Some(config) = &self.config
+                    && let Err(problem) = self.transform.set(action, &config.profiles)
+                {
+                    self.error(ErrorCode::NoSuchProfile, problem, Some(line.0));
+                }
+            }
             Action::MotorsOff { x, y, z, .. } => {
                 if let Some(guard) = &mut self.guard {
                     let off = [x, y, z];
@@ -258,7 +269,7 @@ impl Checker {
                 }
             }
         }
-        let allowed = self.guard.as_ref().map_or(Ok(()), |guard| guard.judge(mv));
+        let allowed = self.guard.as_ref().map_or(Ok(()), |guard| judge(guard, &self.transform, mv));
         let possible = self.speeds.as_ref().map_or(Ok(()), |speeds| speeds.judge(mv));
         if let Err(error) = allowed.and(possible) {
             self.keep(error);
@@ -268,10 +279,8 @@ impl Checker {
     /// An arc may lead out of the machine between two places that are in it.
     fn judge_arc(&mut self, arc: &Arc) {
         if let Some(guard) = &self.guard {
-            let reach = |to: gcode::Position| {
-                let to = gcode::Position { e: arc.from.e, ..to };
-                guard.judge(&Move { line: arc.line, from: arc.from, to, feed: arc.feed, rapid: false })
-            };
+            let place = |at: gcode::Position| self.transform.machine_from_gcode([at.x, at.y, at.z]);
+            let reach = |to: gcode::Position| guard.judge_travel(place(arc.from), place(to), arc.line);
             if let Err(error) = arc.extremes().try_for_each(reach) {
                 self.keep(error);
             }
@@ -332,6 +341,23 @@ impl Checker {
             };
         }
     }
+}
+
+/// Why a move may not be made, if so: where the machine goes for it, and what it extrudes.
+fn judge(guard: &Guard, transform: &Transform, mv: &Move) -> Result<(), PrinterError> {
+    if transform.is_identity() {
+        return guard.judge(mv);
+    }
+    let (from, to) = (mv.from.to_array(), mv.to.to_array());
+    if from[..3] != to[..3] {
+        let [x, y, z, _] = from;
+        let mut at = transform.machine_from_gcode([x, y, z]);
+        for [x, y, z, _] in transform.pieces(from, to) {
+            guard.judge_travel(at, [x, y, z], mv.line)?;
+            at = [x, y, z];
+        }
+    }
+    guard.judge_extrusion(mv)
 }
 
 #[cfg(test)]

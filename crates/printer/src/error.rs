@@ -93,6 +93,9 @@ catalogue! {
     NoSuchHeater, "no-such-heater":
         "The file heats something that this printer does not have", REFUSED,
         "Slice for this printer, or add the heater to printer.cfg.";
+    NoSuchProfile, "no-such-profile":
+        "A line loads a skew or a bed mesh that cannot be had", REFUSED,
+        "Write that section into printer.cfg, or take the line out of the slicer's start G-code.";
     ColdExtrusion, "cold-extrusion":
         "Filament was to be pushed through a nozzle below min_extrude_temp", REFUSED,
         "Heat the nozzle first (M109 before the first extrusion). Lower min_extrude_temp only for materials that melt colder.";

@@ -22,3 +22,4 @@ mod reach;
 pub mod session;
 pub mod step_rate;
 pub mod thermistor;
+pub mod transform;

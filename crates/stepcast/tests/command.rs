@@ -248,6 +248,53 @@ fn a_print_begins_with_a_line_or_a_layer() {
     assert_eq!(stepcast(&both).status.code(), Some(2));
 }
 
+/// What `SAVE_CONFIG` leaves behind a machine file: a bed that is not flat, axes that are not square.
+const LEVEL: &str = "\n[skew_correction]\n[bed_mesh]\nfade_start: 0.5\nfade_end: 10\n\
+    #*# <---------------------- SAVE_CONFIG ---------------------->\n\
+    #*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.\n#*#\n\
+    #*# [bed_mesh default]\n#*# version = 1\n#*# points =\n\
+    #*# \t  0.110000, 0.042500, 0.012500, 0.120000\n#*# \t  0.052500, -0.035000, -0.067500, 0.060000\n\
+    #*# \t  0.030000, -0.062500, -0.102500, 0.030000\n#*# \t  0.150000, 0.065000, 0.020000, 0.160000\n\
+    #*# x_count = 4\n#*# y_count = 4\n#*# mesh_x_pps = 2\n#*# mesh_y_pps = 2\n#*# algo = bicubic\n\
+    #*# tension = 0.2\n#*# min_x = 20.0\n#*# max_x = 80.0\n#*# min_y = 20.0\n#*# max_y = 80.0\n#*#\n\
+    #*# [skew_correction calm]\n#*# xy_skew = 0.004\n#*# xz_skew = -0.002\n#*# yz_skew = 0.001\n";
+
+#[test]
+fn pulses_follow_a_bed_that_is_not_flat() {
+    let machine = fs::read_to_string(MACHINE).unwrap() + LEVEL;
+    let machine = File::new("level.cfg", machine);
+    let gcode = PRINT
+        .replacen("F9000\n", "F9000\nBED_MESH_PROFILE LOAD=default\nSKEW_PROFILE LOAD=calm\n", 1)
+        .replacen("G1 E1.6", "G1 Z3\nG1 X15 Y85 Z0.4 E3.6 F3000\nBED_MESH_CLEAR\nG1 E2.6", 1);
+    let file = File::new("level.gcode", &gcode);
+    let [path, machine] = [&file, &machine].map(|it| it.0.to_str().unwrap());
+    let output = stepcast(&["simulate", path, "--config", machine, "--json"]);
+    let report = json(&output);
+    assert_eq!(report["result"], "done", "{}", report["reason"]);
+    for motor in ["stepper_x", "stepper_y", "stepper_z", "extruder"] {
+        let motor = &report["motors"][motor];
+        assert_eq!(motor["planned_steps"], motor["counted_steps"]);
+        assert_eq!(motor["lost_steps"], 0);
+    }
+    // A microstep across and up, and what a piece may be off.
+    assert!(report["path_error_max_mm"].as_f64().unwrap() <= 0.02, "{}", report["path_error_max_mm"]);
+    let (_, flat) = simulate(
+        &File::new(
+            "flat.gcode",
+            gcode.replace("BED_MESH_PROFILE LOAD=default\n", "").replace("SKEW_PROFILE LOAD=calm\n", ""),
+        ),
+        &[],
+    );
+    let steps = |report: &Value| report["motors"]["stepper_z"]["counted_steps"].as_u64().unwrap();
+    assert!(steps(&report) > steps(&flat) + 20, "Z follows the bed: {} {}", steps(&report), steps(&flat));
+    assert!(report["moves"].as_u64() > flat["moves"].as_u64());
+    // What is not there is said before anything moves.
+    let wrong = File::new("no-mesh.gcode", gcode.replace("LOAD=default", "LOAD=warm"));
+    let output = stepcast(&["simulate", wrong.0.to_str().unwrap(), "--config", machine, "--json"]);
+    let report = json(&output);
+    assert_eq!((&report["result"], &report["error"]["code"]), (&"refused".into(), &"no-such-profile".into()));
+}
+
 #[test]
 fn a_plan_tells_features_layers_and_the_axes_over_time() {
     let file = File::new("trace.gcode", format!(";TYPE:External perimeter\n{PRINT}"));

@@ -16,8 +16,6 @@ use units::{Hertz, Seconds, StepCount, Ticks};
 
 /// The most stretches of one motor's path that wait to be turned into steps.
 pub const PIECES_MAX: usize = 4096;
-/// Steps of one motor that are generated before the others get their turn.
-const TURN_STEPS: u64 = 256;
 /// The axis that pressure advance is for.
 const EXTRUDER: usize = 3;
 /// Positions are below this many steps: beyond it a float's half steps blur.
@@ -382,17 +380,33 @@ impl<K: Kinematics> StepGenerator<K> {
     /// or the run is ended.
     pub fn pop(&mut self) -> Option<StepCommand> {
         loop {
-            let is_full = self.is_full();
-            let order = |a: &&mut Motor, b: &&mut Motor| a.earliest().total_cmp(&b.earliest());
-            let first = self.motors.iter_mut().min_by(order)?;
-            if first.compressor.is_ready() {
-                return first.compressor.pop();
+            // The motor whose next step is first, and when another may be.
+            let (mut index, mut earliest, mut others) = (0, f64::INFINITY, f64::INFINITY);
+            for (motor, at) in self.motors.iter().map(Motor::earliest).enumerate() {
+                if at < earliest {
+                    (index, earliest, others) = (motor, at, earliest);
+                } else if at < others {
+                    others = at;
+                }
             }
-            if !first.advance(self.ended) {
-                if !is_full {
+            let first = self.motors.get_mut(index)?;
+            let is_stuck = loop {
+                if first.compressor.is_ready() {
+                    return first.compressor.pop();
+                }
+                if !first.advance(self.ended) {
+                    break true;
+                }
+                if first.earliest() >= others {
+                    break false;
+                }
+            };
+            if is_stuck {
+                if !self.is_full() {
                     return None;
                 }
                 // Its open command holds up a motor whose pieces have no room left.
+                let first = &mut self.motors[index];
                 first.compressor.close_early(first.known);
                 if !first.compressor.is_ready() {
                     return None;
@@ -448,12 +462,7 @@ impl Motor {
             }
             return self.generated > before || self.compressor.is_ready();
         };
-        let forward = piece.forward;
-        for _ in 0..TURN_STEPS.min(piece.steps) {
-            let time = piece.next_time();
-            self.compressor.step(time, forward);
-            self.generated = time;
-        }
+        self.generated = self.compressor.take_from(piece);
         if piece.steps == 0 {
             self.pieces.pop_front();
         }

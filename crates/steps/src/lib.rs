@@ -28,6 +28,7 @@ mod segment;
 mod shaper;
 mod spec;
 mod stabbing;
+mod windows;
 
 pub use advance::{Advance, Nonlinear};
 pub use compressor::{RUN_SPAN_MAX, STEP_HOLD_MAX, STEPS_BUFFERED_MAX};

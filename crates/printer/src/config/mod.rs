@@ -7,6 +7,7 @@
 //! Nothing is ignored in silence: what is not understood is a diagnostic. Where leaving something out would make the
 //! machine move or heat otherwise than its owner expects, that is an error and there is no [`PrinterConfig`].
 
+mod bed;
 mod diagnostics;
 mod document;
 mod dynamics;
@@ -29,8 +30,11 @@ pub use pin::{PinSpec, Pull};
 pub use stepper::{MotorConfig, StepperConfig};
 pub use thermal::{ControlConfig, ExtruderConfig, FanConfig, HeaterConfig};
 
+use std::sync::Arc;
+
 use motion::MotorAbility;
 
+use crate::transform::Profiles;
 use diagnostics::Log;
 use reader::{Checked, PinRegistry, Reader, Reported};
 
@@ -58,6 +62,8 @@ pub struct PrinterConfig {
     pub firmware_retraction: Option<FirmwareRetraction>,
     /// `[motor_torque …]` of X, Y, Z and the extruder: what a motor can do at each speed, where that is known.
     pub abilities: [Option<MotorAbility>; 4],
+    /// `[skew_correction …]` and `[bed_mesh …]`: what G-code can load.
+    pub profiles: Arc<Profiles>,
     /// `[force_move] enable_force_move`: positions may be set by hand.
     pub force_move: bool,
 }
@@ -130,6 +136,7 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
     let input_shaper = dynamics::input_shaper(&mut builder);
     let firmware_retraction = machine::firmware_retraction(&mut builder);
     let force_move = machine::force_move(&mut builder);
+    let profiles = bed::profiles(&mut builder);
     let feeder = extruder.as_ref().ok().and_then(Option::as_ref).map(|extruder| extruder.motor.clone());
     let motors = kinematics::motor_names(kind).into_iter().zip(
         steppers
@@ -165,6 +172,7 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
         input_shaper: input_shaper?,
         firmware_retraction: firmware_retraction?,
         abilities: abilities.into_iter().collect::<Checked<Vec<_>>>()?.try_into().map_err(|_| Reported)?,
+        profiles: profiles?,
         force_move: force_move?,
     })
 }

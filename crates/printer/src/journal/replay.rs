@@ -157,6 +157,7 @@ impl Replay {
         let wanted = journal.runs.iter().rfind(|run| run.id == queue.id);
         let wanted = *wanted.ok_or_else(|| differs("the board carries out something else"))?;
         let mut planner = Planner::new(config, clock)?;
+        planner.set_recorded_transform(&journal.transform)?;
         if journal.start_line.is_none() {
             planner.stand_at(journal.position);
             (0..3).for_each(|axis| planner.guard.set_homed(axis, journal.homed[axis]));

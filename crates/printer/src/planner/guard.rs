@@ -70,23 +70,33 @@ impl Guard {
 
     /// Why this move may not be made, if so.
     pub fn judge(&self, mv: &Move) -> Result<(), PrinterError> {
-        let from = [mv.from.x, mv.from.y, mv.from.z];
-        let to = [mv.to.x, mv.to.y, mv.to.z];
-        let out_of_range = |detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(mv.line.0);
+        let [from, to] = [mv.from, mv.to].map(|at| [at.x, at.y, at.z]);
+        self.judge_travel(from, to, mv.line)?;
+        self.judge_extrusion(mv)
+    }
+
+    /// Why the head may not go there, if so.
+    pub(crate) fn judge_travel(
+        &self,
+        from: [f64; 3],
+        to: [f64; 3],
+        line: LineNumber,
+    ) -> Result<(), PrinterError> {
+        let out_of_range = |detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(line.0);
         for axis in 0..3 {
             if from[axis] == to[axis] {
                 continue;
             }
             if !self.homed[axis] {
                 let detail = format!("axis {} has not been homed", AXES[axis]);
-                return Err(PrinterError::new(ErrorCode::NotHomed, detail).at_line(mv.line.0));
+                return Err(PrinterError::new(ErrorCode::NotHomed, detail).at_line(line.0));
             }
             self.reach.judge_axis(axis, to[axis]).map_err(out_of_range)?;
         }
         if from != to {
             self.reach.judge_way(from, to).map_err(out_of_range)?;
         }
-        self.judge_extrusion(mv)
+        Ok(())
     }
 
     /// Why this piece of an arc may not be made, where its straight one may: it bulges.
@@ -102,7 +112,8 @@ impl Guard {
             .map_err(|detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(line.0))
     }
 
-    fn judge_extrusion(&self, mv: &Move) -> Result<(), PrinterError> {
+    /// Why it may not push so much filament, if so.
+    pub(crate) fn judge_extrusion(&self, mv: &Move) -> Result<(), PrinterError> {
         let filament = mv.to.e - mv.from.e;
         if filament == 0.0 {
             return Ok(());

@@ -16,6 +16,9 @@ mod extrusion_tests;
 mod guard;
 mod item;
 mod judge;
+mod level;
+#[cfg(test)]
+mod level_tests;
 mod paces;
 mod report;
 mod skip;
@@ -24,7 +27,7 @@ mod source;
 mod tests;
 mod trace;
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, sync::Arc};
 
 use gcode::{Action, LineNumber, Wait};
 use motion::{Bend, Bound, Limits, LookAhead, MoveRequest, PlannedMove};
@@ -51,6 +54,7 @@ use crate::{
     error::{ErrorCode, PrinterError},
     machine::{self, EXTRUDER},
     step_rate::StepRates,
+    transform::{Profiles, Transform},
 };
 
 /// How far the run of motion is.
@@ -113,6 +117,10 @@ pub struct Planner {
     barrier: Option<(LineNumber, Barrier)>,
     said: Said,
     course: Course,
+    /// From the G-code's coordinates to the machine's, for the moves that are read from now on …
+    transform: Transform,
+    /// … and what can be loaded.
+    profiles: Arc<Profiles>,
     step_rates: StepRates,
     unreachable_speed: UnreachableSpeed,
     is_broken: bool,
@@ -149,6 +157,8 @@ impl Planner {
             barrier: None,
             said: Said::default(),
             course: Course::new(config),
+            transform: Transform::default(),
+            profiles: Arc::clone(&config.profiles),
             step_rates: StepRates::new(config, clock),
             unreachable_speed: config.printer.unreachable_speed,
             is_broken: false,
@@ -163,7 +173,7 @@ impl Planner {
         self.bound = Some(Box::new(Bound::new(config.abilities.to_vec())));
     }
 
-    /// Where the last accepted move ends.
+    /// Where the last accepted move ends, in machine coordinates.
     pub const fn position(&self) -> Position {
         self.position
     }
@@ -206,24 +216,8 @@ impl Planner {
         self.position = position;
     }
 
-    /// Makes a source continue from where the machine is: before its first line, and whenever another source moved. Its
-    /// offsets are forgotten.
-    pub fn adopt(&mut self, source: &mut Source) {
-        let [x, y, z, e] = self.position;
-        source.interpreter.set_axes(Some(x), Some(y), Some(z));
-        source.e_offset = e - source.interpreter.position().e;
-        self.said = Said::default();
-    }
-
-    /// Tells a source whose move was refused, or stopped, that the machine stands here. Its offsets hold.
-    pub fn correct(&mut self, source: &mut Source) {
-        let [x, y, z, e] = self.position;
-        source.interpreter.stand_at(x, y, z);
-        source.e_offset = e - source.interpreter.position().e;
-    }
-
     /// As [`Self::adopt`], for a job, whose plan is to depend on nothing that was done before: the machine file's limits
-    /// hold again, and the filament counts from 0. At rest.
+    /// hold again, and the filament counts from 0. What makes up for skew and bed stays in force. At rest.
     pub fn begin_job(&mut self, source: &mut Source) {
         debug_assert!(self.is_at_rest(), "a job begins at rest");
         self.position[EXTRUDER] = 0.0;
@@ -333,6 +327,10 @@ impl Planner {
                 continue;
             }
             if let Some(piece) = source.next_piece() {
+                self.push_piece(&piece, source)?;
+                continue;
+            }
+            if let Some(piece) = source.next_arc_piece() {
                 self.judge_and_push(&piece.chord, Some(&arcs::bend(&piece)), source)?;
                 continue;
             }
@@ -393,6 +391,11 @@ impl Planner {
             Action::TurnOffHeaters => self.defer(line, TimedAction::TurnOffHeaters),
             Action::Cancel => self.barrier = Some((line, Barrier::Cancel)),
             Action::PressureAdvance { .. } | Action::InputShaper(_) => self.set_dynamics(&action),
+            Action::Skew(_) | Action::BedMesh(_) => {
+                if let Some(text) = self.set_transform(&action, line)? {
+                    self.defer(line, TimedAction::Message(text));
+                }
+            }
             // The interpreter has the factors in its moves already; the machine file knows the machine's limits; there
             // is only one tool.
             Action::SpeedFactor(_)

@@ -198,10 +198,10 @@ impl Session {
         }
     }
 
-    /// Where the last planned move ends: X, Y, Z, E in mm, and which axes are homed.
+    /// Where the last planned move ends, in the G-code's coordinates: X, Y, Z, E in mm, and which axes are homed.
     pub fn position(&self) -> Option<(Position, [bool; 3])> {
         match &self.stage {
-            Stage::Ready(ready) => Some((ready.planner.position(), ready.planner.guard.homed())),
+            Stage::Ready(ready) => Some((ready.planner.gcode_position(), ready.planner.guard.homed())),
             _ => None,
         }
     }

@@ -3,14 +3,15 @@
 //! The session says which move it makes when; each of them must be the file's next move, from its first to its last. Knows
 //! G-code and nothing of pulses. Positions in mm, filament counted from the start of the file.
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, sync::Arc};
 
 use gcode::{Action, CHORD_TOLERANCE, Chords, Interpreter, Lines, Move, Settings};
+use printer::transform::{Profiles, Transform};
 
-use super::arc_way::ArcWay;
+use super::{arc_way::ArcWay, bent_path::BentMove};
 
 /// How far a move's end may be from the file's, in mm: the dust of arithmetic, far below a step.
-const SAME_PLACE_MM: f64 = 1e-6;
+pub(super) const SAME_PLACE_MM: f64 = 1e-6;
 /// X, Y, Z.
 const AXES: usize = 3;
 /// The most homed positions that wait for their line: one an axis, and an axis may be homed again.
@@ -61,6 +62,14 @@ pub(crate) struct GcodePath<R> {
     /// The arc that is being cut into pieces.
     chords: Option<Chords>,
     homed: VecDeque<(usize, f64)>,
+    /// From the file's coordinates to the machine's …
+    transform: Transform,
+    /// … what can be loaded …
+    profiles: Arc<Profiles>,
+    /// … and the move that is being made in pieces for it.
+    bent: Option<BentMove>,
+    /// A line has changed where places are, and the head has not moved since.
+    is_moved_over: bool,
     /// Lines before this one are read, not made; where axes are once they are homed there.
     begins: (u32, [f64; AXES]),
     /// The machine homes all axes together.
@@ -72,8 +81,8 @@ pub(crate) struct GcodePath<R> {
 }
 
 impl<R: MoreGcode> GcodePath<R> {
-    /// The path of a file, for a machine that stands at 0 and understands it by these settings.
-    pub(crate) fn new(source: R, settings: Settings) -> Self {
+    /// The path of a file, for a machine that stands at 0 and understands it by these settings and profiles.
+    pub(crate) fn new(source: R, settings: Settings, profiles: Arc<Profiles>) -> Self {
         Self {
             source,
             lines: Lines::new(),
@@ -83,6 +92,10 @@ impl<R: MoreGcode> GcodePath<R> {
             line: 0,
             chords: None,
             homed: VecDeque::new(),
+            transform: Transform::default(),
+            profiles,
+            bent: None,
+            is_moved_over: false,
             begins: (0, [0.0; AXES]),
             homes_together: false,
             fed_all: false,
@@ -112,9 +125,29 @@ impl<R: MoreGcode> GcodePath<R> {
     /// Takes the file's next move, which must be this one.
     pub(crate) fn take(&mut self, line: u32, from: [f64; 4], to: [f64; 4]) -> anyhow::Result<Piece> {
         loop {
-            let Some(piece) = self.next()? else {
+            if let Some(bent) = &mut self.bent {
+                let taken = bent.take(&self.transform, line, from, to);
+                self.bent.take_if(|bent| bent.is_made());
+                return taken;
+            }
+            let Some(mut piece) = self.next()? else {
                 anyhow::bail!("the printer makes a move for line {line}, but the file has no more moves");
             };
+            if self.transform.is_identity() {
+                if self.is_moved_over && piece.has_length() {
+                    // It leads there from where the head stood.
+                    piece.from[..AXES].copy_from_slice(&from[..AXES]);
+                    self.is_moved_over = false;
+                }
+            } else {
+                if piece.from[..AXES] != piece.to[..AXES] {
+                    self.bent = Some(BentMove::new(piece, &self.transform, from));
+                    continue;
+                }
+                // Filament alone leaves the head where it is.
+                piece.from[..AXES].copy_from_slice(&from[..AXES]);
+                piece.to[..AXES].copy_from_slice(&from[..AXES]);
+            }
             let filament = (piece.to[AXES] - piece.from[AXES]) - (to[AXES] - from[AXES]);
             let same = piece.line == line
                 && (0..AXES).all(|axis| (piece.to[axis] - to[axis]).abs() <= SAME_PLACE_MM)
@@ -135,6 +168,9 @@ impl<R: MoreGcode> GcodePath<R> {
 
     /// Makes sure that no moves are left.
     pub(crate) fn finish(&mut self) -> anyhow::Result<()> {
+        if self.bent.is_some() {
+            anyhow::bail!("a move of line {} was not made to its end", self.line);
+        }
         while let Some(piece) = self.next()? {
             if piece.has_length() {
                 anyhow::bail!("the move to {} of line {} was never made", place(piece.to), piece.line);
@@ -163,6 +199,7 @@ impl<R: MoreGcode> GcodePath<R> {
                     Action::Arc(arc) => self.chords = Some(arc.chords(CHORD_TOLERANCE)),
                     Action::Home { x, y, z } => self.home([x, y, z])?,
                     Action::Cancel => self.ended = true,
+                    Action::Skew(_) | Action::BedMesh(_) => self.set_transform(&action),
                     Action::PressureAdvance { .. } | Action::InputShaper(_) => self.filters = true,
                     _ => {}
                 }
@@ -181,6 +218,16 @@ impl<R: MoreGcode> GcodePath<R> {
             let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.begins.1[axis]));
             self.interpreter.set_axes(x, y, z);
         }
+        if matches!(action, Action::Skew(_) | Action::BedMesh(_)) {
+            self.set_transform(action);
+        }
+    }
+
+    /// What cannot be loaded ends the print, which is told elsewhere.
+    fn set_transform(&mut self, action: &Action) {
+        let before = self.transform.clone();
+        let _ = self.transform.set(action, &self.profiles);
+        self.is_moved_over |= self.transform != before;
     }
 
     /// Reads the next line into `actions`; `false` at the end.
@@ -223,7 +270,7 @@ impl<R: MoreGcode> GcodePath<R> {
     }
 }
 
-fn place([x, y, z, e]: [f64; 4]) -> String {
+pub(super) fn place([x, y, z, e]: [f64; 4]) -> String {
     format!("X{x:.4} Y{y:.4} Z{z:.4} (filament {e:.4})")
 }
 
@@ -244,7 +291,7 @@ mod tests {
     }
 
     fn path(text: &'static str) -> GcodePath<Text> {
-        GcodePath::new(Text(text.as_bytes(), 7), Settings::default())
+        GcodePath::new(Text(text.as_bytes(), 7), Settings::default(), Arc::default())
     }
 
     const FILE: &str = "G28\nG92 E0\nG1 X10 F600\nG1 X10\nM117 hello\nG1 X10 Y5 E0.5\n";

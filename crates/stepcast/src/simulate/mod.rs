@@ -4,6 +4,7 @@
 //! same file, read a second time, says what the pulses should draw.
 
 mod arc_way;
+mod bent_path;
 mod course;
 mod digest;
 mod gcode_path;

@@ -118,7 +118,8 @@ impl Observer {
         start: Ticks,
         quiet: bool,
     ) -> Self {
-        let mut gcode = GcodePath::new(reference, printer::machine::gcode_settings(config));
+        let profiles = std::sync::Arc::clone(&config.profiles);
+        let mut gcode = GcodePath::new(reference, printer::machine::gcode_settings(config), profiles);
         gcode.homes_together = matches!(gantry, Gantry::Delta(_));
         let endstop_mm = config.steppers.each_ref().map(|axis| axis.position_endstop.0);
         Self {

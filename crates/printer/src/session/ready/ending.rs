@@ -243,6 +243,7 @@ impl Ready {
             Ok(aside) => aside,
             Err(error) => return self.source_failed(error, now),
         };
+        aside.set_same_transform(&self.planner);
         aside.stand_at(position);
         (0..3).for_each(|axis| aside.guard.set_homed(axis, homed[axis]));
         let could_extrude = self.extrusion_permit() == ExtrusionPermit::Allowed;

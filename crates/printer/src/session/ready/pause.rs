@@ -59,6 +59,7 @@ impl Ready {
         self.diary.park(queues, cut.is_some(), at, retract, &mut self.board);
         let homed = self.planner.guard.homed();
         let mut aside = Planner::new(&self.config, self.board.clock).map_err(Failure::Stop)?;
+        aside.set_same_transform(&self.planner);
         aside.stand_at(position);
         (0..3).for_each(|axis| aside.guard.set_homed(axis, homed[axis]));
         if cut.is_none() {

@@ -56,6 +56,7 @@ impl Ready {
         diary.take_up(&taken, now);
         let mut ready = Self::with_planner(config, board, planner, now);
         (ready.diary, ready.rate) = (diary, Rate::unknown());
+        ready.planner.set_same_transform(&taken.planner);
         ready.planner.stand_at(here);
         let homed = taken.planner.guard.homed();
         (0..3).for_each(|axis| ready.planner.guard.set_homed(axis, homed[axis]));
