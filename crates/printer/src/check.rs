@@ -296,6 +296,7 @@ impl Checker {
     }
 
     fn home(&mut self, axes: [bool; 3]) {
+        let axes = self.config.as_ref().map_or(axes, |config| machine::homed_together(config, axes));
         let mut at = [None; 3];
         for axis in (0..3).filter(|&axis| axes[axis]) {
             at[axis] =

@@ -18,6 +18,7 @@ pub mod move_queue;
 mod pace;
 pub mod planner;
 pub mod preview;
+mod reach;
 pub mod session;
 pub mod step_rate;
 pub mod thermistor;

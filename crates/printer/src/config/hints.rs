@@ -3,7 +3,12 @@
 /// What an option holds, with an example.
 pub(super) fn hint(key: &str) -> &'static str {
     match key {
-        "kinematics" => "`kinematics: cartesian`",
+        "kinematics" => "`kinematics: cartesian`, corexy, corexz, hybrid_corexy, hybrid_corexz or delta",
+        "delta_radius" => "the distance in mm from the middle to where the arms' carriages ride, e.g. 134",
+        "print_radius" => "the radius in mm of what can be printed on, e.g. 110",
+        "minimum_z_position" => "the lowest position in mm that Z may go to, e.g. 0",
+        "arm_length" => "the length of the diagonal arms in mm, from joint to joint, e.g. 270",
+        "angle" => "the tower's direction in degrees: usually 210, 330 and 90 for a, b and c",
         "max_velocity" => "the machine's top speed in mm/s, e.g. 300",
         "max_accel" => "the machine's acceleration in mm/s², e.g. 3000",
         "max_z_velocity" => "the top speed of Z in mm/s, e.g. 15",

@@ -34,6 +34,7 @@ const MISSED: &[(&str, &str)] = &[
     ("gcode_macro", "macros are not run: the line of a file that calls one asks for confirmation"),
     ("delayed_gcode", "its commands are not run"),
     ("bed_tilt", "the bed is taken as level"),
+    ("delta_calibrate", "the towers are taken as the file has them"),
     ("bed_screws", "there is no assistant for it yet"),
     ("screws_tilt_adjust", "there is no assistant for it yet"),
     ("probe", "the bed is not probed; Z homes by its own endstop"),

@@ -55,7 +55,7 @@ fn the_extruders_limits_follow_from_nozzle_and_filament() {
 }
 
 /// The machine with the first `old` replaced, or, where `old` is empty, with text put after it.
-fn with(old: &str, new: &str) -> String {
+pub(super) fn with(old: &str, new: &str) -> String {
     assert!(SMALL_MACHINE.contains(old), "`{old}` is not there");
     if old.is_empty() {
         return format!("{SMALL_MACHINE}{new}");
@@ -68,7 +68,7 @@ fn line_of(text: &str, what: &str) -> u32 {
 }
 
 /// Asserts that a change gives one diagnostic, on the line that holds `at` (none: the whole file), saying `words`.
-fn assert_diagnosed(text: &str, severity: Severity, at: &str, words: &str) {
+pub(super) fn assert_diagnosed(text: &str, severity: Severity, at: &str, words: &str) {
     let (config, diagnostics) = parse(text);
     let line = if at.is_empty() { 0 } else { line_of(text, at) };
     assert_eq!(config.is_some(), severity != Severity::Error, "{diagnostics:#?}");
@@ -86,7 +86,7 @@ fn every_wrong_value_is_an_error_on_its_line() {
         ("max_velocity: 300", "max_velocity: nan", "max_velocity: nan", "must be above 0"),
         ("max_velocity: 300", "max_velocity: 1e300", "1e300", "must be above 0 and at most 10000"),
         ("max_velocity: 300", "max_velocity:", "max_velocity:", "it has no value"),
-        ("kinematics: cartesian", "kinematics: delta", "delta", "only `cartesian` machines"),
+        ("kinematics: cartesian", "kinematics: polar", "polar", "there are cartesian, corexy,"),
         ("step_pin: gpio2", "step_pin: ^gpio2", "^gpio2", "an output has no pull-up"),
         ("step_pin: gpio2", "step_pin: probe:x", "probe:x", "only pins of the main board"),
         ("rotation_distance: 40", "rotation_distance: 0", "rotation_distance: 0", "must be above 0"),

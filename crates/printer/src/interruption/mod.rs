@@ -229,8 +229,9 @@ impl Survey {
                 None
             }
             Action::Home { x, y, z } => {
-                let home = |axis: usize, is: bool| is.then_some(self.endstops[axis]);
-                self.source.interpreter.set_axes(home(0, *x), home(1, *y), home(2, *z));
+                let axes = machine::homed_together(&self.config, [*x, *y, *z]);
+                let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.endstops[axis]));
+                self.source.interpreter.set_axes(x, y, z);
                 None
             }
             Action::Skew(_) | Action::BedMesh(_) => {
@@ -273,7 +274,12 @@ impl Survey {
             layer_line: known.layer_line,
             position: known.position.map(Mm),
             z_range: z_range.map(|range| range.map(Mm)),
-            standings: Standings::new(&self.config.steppers[2].motor, height, z_range),
+            standings: Standings::new(
+                &self.config.steppers[2].motor,
+                // Without a motor of its own the place of no coil says where Z is.
+                height.filter(|_| machine::has_z_motor(&self.config)),
+                z_range,
+            ),
             factors: known.factors,
         })
     }

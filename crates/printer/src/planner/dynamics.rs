@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 
 use gcode::{Action, AxisShaper, InputShaper};
-use steps::{Advance, Filters, StepGenerator};
+use steps::{Advance, Filters, Geometry, StepGenerator};
 use units::Seconds;
 
 use super::Planner;
@@ -107,7 +107,7 @@ impl Course {
     }
 
     /// A run begins.
-    pub(super) fn begin_run(&mut self, generator: &mut StepGenerator) {
+    pub(super) fn begin_run(&mut self, generator: &mut StepGenerator<Geometry>) {
         self.advances.clear();
         let filters = self.read.filters();
         if filters != self.filters {
@@ -118,7 +118,7 @@ impl Course {
     }
 
     /// So many moves have been given to the generator.
-    pub(super) fn planned(&mut self, moves: u64, generator: &mut StepGenerator) {
+    pub(super) fn planned(&mut self, moves: u64, generator: &mut StepGenerator<Geometry>) {
         while let Some((_, advance)) = self.advances.pop_front_if(|(after, _)| *after <= moves) {
             generator.set_advance(&advance);
         }

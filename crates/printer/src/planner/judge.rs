@@ -65,6 +65,9 @@ impl Planner {
         let from = gcode::Position { x, y, z, e: e - e_offset };
         self.guard.judge(&Move { from, ..*mv })?;
         let bend = bend.filter(|bend| bend.fits(&self.position, &to));
+        if let Some(bend) = bend {
+            self.guard.judge_bend(bend, self.position, to, mv.line)?;
+        }
         let mut feed = mv.feed;
         for end in arcs::straight_ends(self.position, to, bend) {
             feed = feed.min(self.feed(mv.feed, mv.line, end, source));

@@ -31,7 +31,7 @@ use std::{collections::VecDeque, sync::Arc};
 
 use gcode::{Action, LineNumber, Wait};
 use motion::{Bend, Bound, Limits, LookAhead, MoveRequest, PlannedMove};
-use steps::{PushError, StepGenerator};
+use steps::{Geometry, PushError, StepGenerator};
 use units::{Hertz, MmPerS, Seconds, Ticks};
 
 use dynamics::Course;
@@ -101,7 +101,7 @@ pub struct Planner {
     machine_limits: Limits,
     limits: Limits,
     look_ahead: LookAhead,
-    generator: StepGenerator,
+    generator: StepGenerator<Geometry>,
     position: Position,
     clock: Hertz,
     run: Run,
@@ -124,6 +124,8 @@ pub struct Planner {
     step_rates: StepRates,
     unreachable_speed: UnreachableSpeed,
     is_broken: bool,
+    /// All axes are homed together.
+    homes_together: bool,
     /// What the plan is held against, where somebody wants to know.
     bound: Option<Box<Bound>>,
     /// Where somebody wants to see the axes' paths.
@@ -160,6 +162,7 @@ impl Planner {
             step_rates: StepRates::new(config, clock),
             unreachable_speed: config.printer.unreachable_speed,
             is_broken: false,
+            homes_together: machine::homed_together(config, [true, false, false]) == [true; 3],
             bound: None,
             trace: None,
         })
@@ -196,7 +199,7 @@ impl Planner {
     }
 
     /// What the step generator counted so far.
-    pub fn generator(&self) -> &StepGenerator {
+    pub fn generator(&self) -> &StepGenerator<Geometry> {
         &self.generator
     }
 
@@ -229,6 +232,11 @@ impl Planner {
     /// A move could not be turned into steps, so that the run cannot be brought to rest: everything has to stop.
     pub const fn is_broken(&self) -> bool {
         self.is_broken
+    }
+
+    /// The axes that are homed where a line wants these to be.
+    pub(crate) fn homed_together(&self, axes: [bool; 3]) -> [bool; 3] {
+        if self.homes_together && axes.contains(&true) { [true; 3] } else { axes }
     }
 
     /// Lets the machine come to rest after the moves that were read; [`Planned::RunEnded`] tells when. Whether that
@@ -360,7 +368,9 @@ impl Planner {
             Action::Object(object) => self.defer(line, TimedAction::Object(object)),
             Action::ReportTemperatures => self.defer(line, TimedAction::ReportTemperatures),
             Action::ReportPosition => self.defer(line, TimedAction::ReportPosition),
-            Action::Home { x, y, z } => self.barrier = Some((line, Barrier::Home([x, y, z]))),
+            Action::Home { x, y, z } => {
+                self.barrier = Some((line, Barrier::Home(self.homed_together([x, y, z]))));
+            }
             Action::Dwell(pause) if self.run == Run::Active && pause <= DWELL_IN_RUN_MAX => {
                 self.look_ahead.dwell(pause);
                 self.bound.iter_mut().for_each(|bound| bound.dwell(pause));

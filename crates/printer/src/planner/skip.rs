@@ -140,8 +140,9 @@ impl Skip {
             Action::VelocityLimit(limit) => planner.limit(limit),
             Action::PressureAdvance { .. } | Action::InputShaper(_) => planner.set_dynamics(action),
             Action::Home { x, y, z } => {
-                let home = |axis: usize, is: bool| is.then_some(self.endstops[axis]);
-                source.interpreter.set_axes(home(0, x), home(1, y), home(2, z));
+                let axes = planner.homed_together([x, y, z]);
+                let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.endstops[axis]));
+                source.interpreter.set_axes(x, y, z);
             }
             Action::Cancel | Action::EmergencyStop => {
                 let detail = format!("the file ends the print before line {}", self.until.0);

@@ -271,6 +271,10 @@ impl Ready {
             let detail = format!("an axis cannot stand at {position}");
             return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail));
         }
+        if machine::homed_together(&self.config, [true, false, false]) == [true; 3] {
+            let detail = "where a delta's head is cannot be said axis by axis: home it, it goes upwards";
+            return Err(PrinterError::new(ErrorCode::NotHomed, detail));
+        }
         self.diary.lose_place(&mut self.board);
         self.planner.set_axis(axis, position.0, true);
         self.note_height(self.planner.position()[2], MovedBy::Others);

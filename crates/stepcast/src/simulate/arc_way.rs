@@ -57,9 +57,9 @@ impl ArcWay {
         (spread(place), spread(change))
     }
 
-    /// Where it turns back along an axis, if it does: no piece does so twice.
-    pub(crate) fn turning_point(&self, axis: usize) -> Option<f64> {
-        let slope = |share: f64| self.at(share).1[axis];
+    /// Where it turns back along a sum of axes, if it does: no piece does so twice.
+    pub(crate) fn turning_point(&self, along: impl Fn(Place) -> f64) -> Option<f64> {
+        let slope = |share: f64| along(self.at(share).1);
         let (mut low, mut high) = (0.0, 1.0);
         let rises = slope(low) > 0.0;
         if (slope(high) > 0.0) == rises {
@@ -69,7 +69,7 @@ impl ArcWay {
             let middle = 0.5 * (low + high);
             *(if (slope(middle) > 0.0) == rises { &mut low } else { &mut high }) = middle;
         }
-        Some(self.at(low).0[axis])
+        Some(along(self.at(low).0))
     }
 
     /// The square of the distance of `point`; `share` is where it is along the chord.
@@ -112,8 +112,8 @@ mod tests {
             assert!((found - libm::hypot(radius - 5.0, up)).abs() < 1e-9, "{angle} {found}");
         }
         // To the right of the centre it goes farthest out.
-        assert!((way.turning_point(0).unwrap() - 15.0).abs() < 1e-12);
-        assert_eq!((way.turning_point(1), way.turning_point(2)), (None, None));
+        assert!((way.turning_point(|[x, ..]| x).unwrap() - 15.0).abs() < 1e-12);
+        assert_eq!((way.turning_point(|[_, y, _]| y), way.turning_point(|[.., z]| z)), (None, None));
         // Beyond its ends, the end counts.
         let beyond = way.distance_squared([10.0, 5.0, 1.0], 0.0).sqrt();
         let end = [10.0 + 5.0 * libm::cos(0.2), 5.0 * libm::sin(0.2)];

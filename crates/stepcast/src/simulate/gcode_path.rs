@@ -72,6 +72,8 @@ pub(crate) struct GcodePath<R> {
     is_moved_over: bool,
     /// Lines before this one are read, not made; where axes are once they are homed there.
     begins: (u32, [f64; AXES]),
+    /// The machine homes all axes together.
+    pub(crate) homes_together: bool,
     fed_all: bool,
     ended: bool,
     /// The file has changed pressure advance or an input shaper on the way.
@@ -95,6 +97,7 @@ impl<R: MoreGcode> GcodePath<R> {
             bent: None,
             is_moved_over: false,
             begins: (0, [0.0; AXES]),
+            homes_together: false,
             fed_all: false,
             ended: false,
             filters: false,
@@ -104,6 +107,11 @@ impl<R: MoreGcode> GcodePath<R> {
     /// The print begins with this line; those before are read as if axes had been homed to these positions.
     pub(crate) fn begin_with(&mut self, line: u32, endstops: [f64; AXES]) {
         self.begins = (line, endstops);
+    }
+
+    /// The axes that the machine homes where the file wants these to be.
+    fn homed_by(&self, axes: [bool; AXES]) -> [bool; AXES] {
+        if self.homes_together && axes.contains(&true) { [true; AXES] } else { axes }
     }
 
     /// The printer found this axis' endstop and says that it is here.
@@ -206,8 +214,9 @@ impl<R: MoreGcode> GcodePath<R> {
     /// An action of a line that is not made.
     fn pass(&mut self, action: &Action) {
         if let Action::Home { x, y, z } = *action {
-            let at = |axis: usize, is: bool| is.then_some(self.begins.1[axis]);
-            self.interpreter.set_axes(at(0, x), at(1, y), at(2, z));
+            let axes = self.homed_by([x, y, z]);
+            let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.begins.1[axis]));
+            self.interpreter.set_axes(x, y, z);
         }
         if matches!(action, Action::Skew(_) | Action::BedMesh(_)) {
             self.set_transform(action);
@@ -247,6 +256,7 @@ impl<R: MoreGcode> GcodePath<R> {
     }
 
     fn home(&mut self, axes: [bool; AXES]) -> anyhow::Result<()> {
+        let axes = self.homed_by(axes);
         let mut at = [None; AXES];
         for axis in (0..AXES).filter(|&axis| axes[axis]) {
             let Some(found) = self.homed.iter().position(|&(homed, _)| homed == axis) else {

@@ -12,6 +12,7 @@
 use std::collections::VecDeque;
 
 use units::{Hertz, Seconds, Ticks};
+use virtual_printer::Gantry;
 
 use super::arc_way::ArcWay;
 
@@ -128,6 +129,10 @@ fn minus(a: [f64; AXES], b: [f64; AXES]) -> [f64; AXES] {
 #[derive(Clone, Debug)]
 pub(crate) struct PathCheck {
     step_distance_mm: [f64; 4],
+    /// How the motors hold the head.
+    gantry: Gantry,
+    /// Where each motor is.
+    motors_mm: [f64; AXES],
     /// Position of each motor at count 0.
     origin_mm: [f64; 4],
     counts: [i64; 4],
@@ -155,6 +160,8 @@ impl PathCheck {
     pub(crate) fn new(step_distance_mm: [f64; 4], clock: Hertz, reach: Seconds) -> Self {
         Self {
             step_distance_mm,
+            gantry: Gantry::default(),
+            motors_mm: [0.0; AXES],
             origin_mm: [0.0; 4],
             counts: [0; 4],
             position: [0.0; AXES],
@@ -172,8 +179,26 @@ impl PathCheck {
         }
     }
 
-    /// A motor that stands still is at this position from now on.
-    pub(crate) fn set_position(&mut self, motor: usize, position_mm: f64) {
+    /// The machine's motors hold its head like this.
+    pub(crate) const fn set_gantry(&mut self, gantry: Gantry) {
+        self.gantry = gantry;
+    }
+
+    /// An axis that stands still is at this position from now on.
+    pub(crate) fn set_position(&mut self, axis: usize, position_mm: f64) {
+        let Some(slot) = self.position.get_mut(axis) else {
+            return self.set_origin(axis, position_mm);
+        };
+        *slot = position_mm;
+        let head = self.position;
+        for (motor, at) in self.gantry.motors(head).into_iter().enumerate() {
+            self.set_origin(motor, at);
+        }
+        // Axes that have not been said yet may belong to no place of the motors.
+        self.position = head;
+    }
+
+    fn set_origin(&mut self, motor: usize, position_mm: f64) {
         let (Some(origin), Some(distance)) =
             (self.origin_mm.get_mut(motor), self.step_distance_mm.get(motor))
         else {
@@ -270,7 +295,17 @@ impl PathCheck {
 
     /// Where the pulses have brought a motor, in mm.
     pub(crate) fn position_mm(&self, motor: usize) -> f64 {
-        self.position.get(motor).copied().unwrap_or(self.filament)
+        self.motors_mm.get(motor).copied().unwrap_or(self.filament)
+    }
+
+    /// Whether motors move axes together.
+    pub(crate) const fn is_coupled(&self) -> bool {
+        self.gantry.is_coupled()
+    }
+
+    /// Where a motor is when the machine is there.
+    pub(crate) fn motor_mm(&self, motor: usize, [x, y, z, e]: [f64; 4]) -> f64 {
+        self.gantry.motors([x, y, z]).get(motor).copied().unwrap_or(e)
     }
 
     #[inline]
@@ -284,9 +319,14 @@ impl PathCheck {
     #[inline]
     fn place(&mut self, motor: usize) {
         let at = self.origin_mm[motor] + self.counts[motor] as f64 * self.step_distance_mm[motor];
-        match self.position.get_mut(motor) {
-            Some(axis) => *axis = at,
-            None => self.filament = at,
+        let Some(slot) = self.motors_mm.get_mut(motor) else {
+            self.filament = at;
+            return;
+        };
+        *slot = at;
+        match &self.gantry {
+            Gantry::Cartesian => self.position[motor] = at,
+            gantry => self.position = gantry.head(self.motors_mm),
         }
     }
 
