@@ -308,6 +308,8 @@ impl<'a> Window<'a> {
         if knot < end && safe < self.speed(knot) {
             self.speeds[knot] = Some(safe);
             self.keep_in_reach();
+            // From a lower speed more acceleration builds up, and another junction may be passed faster than before.
+            self.solve();
         }
         knot
     }
