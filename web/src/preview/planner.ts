@@ -116,20 +116,12 @@ function fromSummary(summary: PreviewSummary): Summary {
   };
 }
 
-/** What only a planner offers that keeps what it knows of each segment. */
-interface Planned {
-  want_channels?(): void;
-  take_channels?(): Uint32Array;
-}
-
 class WasmPreview implements FilePreview {
   readonly #inner: Preview;
-  readonly #planned: Planned;
 
   constructor(config: string | null) {
     this.#inner = new Preview(config ?? undefined);
-    this.#planned = this.#inner as Preview & Planned;
-    if (config !== null) this.#planned.want_channels?.();
+    if (config !== null) this.#inner.want_channels();
   }
 
   wants(): number {
@@ -171,7 +163,7 @@ class WasmPreview implements FilePreview {
   }
 
   takeChannels(): Uint32Array<ArrayBuffer> {
-    return (this.#planned.take_channels?.() ?? new Uint32Array()) as Uint32Array<ArrayBuffer>;
+    return this.#inner.take_channels() as Uint32Array<ArrayBuffer>;
   }
 
   summary(): Summary {
