@@ -126,7 +126,7 @@ async function memory(browser, page) {
 const rounded = (value, digits = 3) => (Number.isFinite(value) ? Number(value.toFixed(digits)) : null);
 
 /** The page as visitors get it. */
-async function stepcast(browser, url, file) {
+async function stepcast(browser, url, file, result) {
   const context = await browser.newContext({ viewport: SIZE, serviceWorkers: 'block' });
   const page = await context.newPage();
   await page.addInitScript(watchWorkers);
@@ -142,7 +142,6 @@ async function stepcast(browser, url, file) {
   await choose.waitFor();
   // Everything is loaded, the empty bed is drawn.
   await page.waitForFunction(() => globalThis.seen.frames.some(({ kind }) => kind === 'full'), null, { timeout: 60_000 });
-  const result = {};
   const before = await uploaded();
   const blocks = await blocksOf(browser, async () => {
     const chooser = page.waitForEvent('filechooser');
@@ -152,25 +151,26 @@ async function stepcast(browser, url, file) {
     await page.waitForFunction(() => globalThis.seen.summary || globalThis.seen.failed, null, { timeout: LOAD_TIMEOUT_MS });
     const failed = await page.evaluate(() => globalThis.seen.failed);
     if (failed) throw new Error(failed);
+    const { chosen, summary } = await page.evaluate(() => globalThis.seen);
+    result.load_s = rounded((summary.at - chosen) / 1000);
+    result.segments = summary.vertices;
+    Object.assign(result, await memory(browser, page));
     // The picture of all of it, at rest.
     await page.waitForFunction(
       () => globalThis.seen.frames.some(({ kind, at, totalMs }) => kind === 'full' && at - totalMs > globalThis.seen.summary.at),
       null,
       { timeout: LOAD_TIMEOUT_MS },
     );
-    const { chosen, summary, frames } = await page.evaluate(() => globalThis.seen);
+    const { frames } = await page.evaluate(() => globalThis.seen);
     const shown = frames.slice(empty).find(({ segments, at }) => segments > 0 && at > chosen);
     const full = frames.findLast(({ kind }) => kind === 'full');
-    result.load_s = rounded((summary.at - chosen) / 1000);
     result.first_frame_s = rounded((shown?.at - chosen) / 1000);
     result.full_frame_s = rounded(full.totalMs / 1000);
-    result.segments = summary.vertices;
     result.gpu_bytes_per_segment = rounded(((await uploaded()) - before) / summary.vertices, 1);
     result.orbit_fps = rounded(await orbit(page), 1);
     result.slider_upload_bytes = await slide(page, uploaded);
   });
   Object.assign(result, blocks, await memory(browser, page));
-  return result;
 }
 
 /** Turns the view with the mouse, and counts pictures. */
@@ -205,13 +205,12 @@ async function slide(page, uploaded) {
   return (await uploaded()) - before;
 }
 
-async function peer(browser, url, file, viewer) {
+async function peer(browser, url, file, viewer, result) {
   const page = await (await browser.newContext({ viewport: SIZE })).newPage();
   await page.addInitScript(countUploads);
   page.setDefaultTimeout(LOAD_TIMEOUT_MS);
   await page.goto(`${url}?viewer=${encodeURIComponent(viewer)}`);
   await page.waitForFunction(() => globalThis.isReady);
-  const result = {};
   const bytes = () => page.evaluate(() => globalThis.uploads.bytes);
   const blocks = await blocksOf(browser, async () => {
     const before = await bytes();
@@ -226,7 +225,6 @@ async function peer(browser, url, file, viewer) {
     result.slider_upload_bytes = (await page.evaluate(() => globalThis.slide())) ? (await bytes()) - still : null;
   });
   Object.assign(result, blocks, await memory(browser, page));
-  return result;
 }
 
 /** One viewer, in a browser of its own, so that memory is its own. */
@@ -234,19 +232,22 @@ async function measure(viewer, urls, file) {
   const executablePath = findBrowser();
   if (!executablePath) throw new Error(`Missing: ${BROWSER_ADVICE}`);
   const browser = await chromium.launch({ executablePath, args: browserArguments() });
+  const result = { viewer };
   let timer;
   try {
-    const work = viewer === 'stepcast' ? stepcast(browser, urls.ours, file) : peer(browser, urls.peers, file, viewer);
+    const work = viewer === 'stepcast' ? stepcast(browser, urls.ours, file, result) : peer(browser, urls.peers, file, viewer, result);
     const late = new Promise((_, fail) => {
-      timer = setTimeout(() => fail(new Error('timeout')), LOAD_TIMEOUT_MS + 60_000);
+      timer = setTimeout(() => fail(new Error('timeout')), 2 * LOAD_TIMEOUT_MS + 60_000);
     });
-    return { viewer, ...(await Promise.race([work, late])) };
+    await Promise.race([work, late]);
   } catch (error) {
-    return { viewer, failed: String(error.message ?? error).split('\n')[0] };
+    // What was measured until then is told.
+    result.failed = String(error.message ?? error).split('\n')[0];
   } finally {
     clearTimeout(timer);
     await browser.close();
   }
+  return result;
 }
 
 /** Ours by each other's; what is missing on either side is left out. */
