@@ -3,7 +3,8 @@
 //
 //   node scripts/make-sample-model.mjs && node scripts/slice-samples.mjs
 //
-// Needs PrusaSlicer (`prusa-slicer`, measured with 2.5.0) and Slic3r (`slic3r`, 1.3.0) on the PATH. Neither is needed
+// Needs PrusaSlicer (`prusa-slicer`, measured with 2.5.0), Slic3r (`slic3r`, 1.3.0) and CuraEngine (`CuraEngine`, 4.13.0) on
+// the PATH, and Cura's definitions of settings (CURA_RESOURCES, or where Debian's package `cura` puts them). None is needed
 // to build, test or use Stepcast: what they wrote is committed. Other versions of a slicer give other files, and the
 // first line of each file holds the time it was made, so a new run always shows up as a change.
 import { spawnSync } from 'node:child_process';
@@ -15,6 +16,7 @@ import { fileURLToPath } from 'node:url';
 const root = dirname(dirname(fileURLToPath(import.meta.url)));
 const model = join('samples', 'test-part.stl');
 const BYTES_MAX = 2_000_000;
+const cura = process.env.CURA_RESOURCES ?? '/usr/share/cura/resources';
 
 const samples = [
   {
@@ -33,16 +35,32 @@ const samples = [
       '--output', output, model,
     ],
   },
+  {
+    name: 'test-part-tiny.gcode',
+    command: 'CuraEngine',
+    env: { CURA_ENGINE_SEARCH_PATH: ['definitions', 'extruders'].map((folder) => join(cura, folder)).join(':') },
+    args: (output) => [
+      'slice', '-j', join(cura, 'definitions', 'fdmprinter.def.json'),
+      ...curaSettings(), '-e0', ...curaSettings(), '-o', output, '-l', model,
+    ],
+  },
 ];
+
+/** CuraEngine's settings: a key and a value a line, `\n` for a line end. */
+function curaSettings() {
+  const lines = readFileSync(join(root, 'samples', 'profiles', 'cura.txt'), 'utf8').split('\n');
+  const settings = lines.filter((line) => line !== '' && !line.startsWith('#'));
+  return settings.flatMap((line) => ['-s', line.replaceAll('\\n', '\n')]);
+}
 
 /** Thumbnails are pictures for a printer's screen; they say nothing to a planner. */
 const withoutThumbnails = (text) => text.replace(/^; thumbnail\w* begin[^]*?^; thumbnail\w* end\r?\n/gm, '');
 
-function slice({ name, command, args }) {
+function slice({ name, command, args, env }) {
   const folder = mkdtempSync(join(tmpdir(), 'stepcast-slice-'));
   const output = join(folder, name);
   try {
-    const run = spawnSync(command, args(output), { cwd: root, encoding: 'utf8' });
+    const run = spawnSync(command, args(output), { cwd: root, encoding: 'utf8', env: { ...process.env, ...env } });
     if (run.error?.code === 'ENOENT') throw new Error(`not run: ${command} is not on the PATH`);
     if (run.status !== 0) throw new Error(`${command} failed:\n${run.stdout}${run.stderr}`);
     const text = withoutThumbnails(readFileSync(output, 'utf8'));

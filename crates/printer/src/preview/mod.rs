@@ -6,6 +6,8 @@
 
 mod encoder;
 mod estimate;
+#[cfg(test)]
+mod geometry_tests;
 pub(crate) mod layers;
 mod objects;
 mod pictures;

@@ -161,8 +161,8 @@ pub struct Grid {
     pub step_mm: f64,
 }
 
-/// The finest step: 1023 mm along each axis.
-const STEP_MIN_MM: f64 = 1.0 / 1024.0;
+/// The finest step: 511 mm along each axis.
+const STEP_MIN_MM: f64 = 1.0 / 2048.0;
 /// The step where nothing is known of the machine: 4095 mm along each axis, half of them below 0.
 const STEP_UNKNOWN_MM: f64 = 1.0 / 256.0;
 /// Places this far outside the machine are still told apart, at least.
@@ -294,10 +294,10 @@ mod tests {
     }
 
     #[test]
-    fn usual_machines_are_told_to_a_micrometre_and_unknown_ones_to_four() {
+    fn usual_machines_are_told_to_half_a_micrometre_and_unknown_ones_to_four() {
         let grid = Grid::around(Some([[0.0; 3], [250.0, 210.0, 220.0]]));
-        assert_eq!(grid.step_mm, 1.0 / 1024.0);
-        for place in [[-300.0, -300.0, -300.0], [500.0, 500.0, 500.0]] {
+        assert_eq!(grid.step_mm, 1.0 / 2048.0);
+        for place in [[-130.0, -150.0, -140.0], [380.0, 360.0, 365.0]] {
             assert!(grid.steps(place).1, "{place:?}");
         }
         let unknown = Grid::around(None);
