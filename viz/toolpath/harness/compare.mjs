@@ -1,7 +1,7 @@
 // Compares pictures, and takes them when nothing moves any more.
 
 /** Nothing is drawn for so long: the picture is done. */
-const QUIET_MS = 300;
+const QUIET_MS = 250;
 /** A colour's channel may differ by so much. */
 const CHANNEL_MAX = 40;
 
