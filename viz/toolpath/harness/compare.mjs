@@ -54,8 +54,7 @@ export async function atRest(page) {
     (quietMs) => {
       const { harness } = window;
       const { frames, latest } = harness;
-      if (!latest.get('ranges')?.isWhole || (frames.at(-1)?.kind ?? 'quick') === 'quick')
-        return false;
+      if (!latest.get('ranges')?.isWhole || (frames.at(-1)?.kind ?? 'quick') === 'quick') return false;
       if (harness.seen !== frames.length) {
         harness.seen = frames.length;
         harness.since = performance.now();
