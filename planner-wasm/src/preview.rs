@@ -85,6 +85,19 @@ impl Preview {
         vertices
     }
 
+    /// Asks for what the planner knows of each vertex, before the first byte is fed; there is none without a machine.
+    pub fn want_channels(&mut self) {
+        if let Some(reader) = &mut self.reader {
+            reader.want_channels();
+        }
+    }
+
+    /// What the planner knows of the vertices that it has planned since the last call: four words for each, in their order, by
+    /// `docs/vertex.md`. It comes later than the vertices; take it after them, and once more before the summary.
+    pub fn take_channels(&mut self) -> Vec<u32> {
+        self.reader.as_mut().map(preview::Preview::take_channels).unwrap_or_default()
+    }
+
     /// Pairs of a line and the vertex at which its segment ends, one for some dozens of vertices, in order; what is new
     /// since the last call.
     pub fn take_marks(&mut self) -> Vec<u32> {

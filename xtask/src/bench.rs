@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result, bail};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::callgrind::{self, SelfCosts};
 use crate::workspace;
@@ -33,8 +33,8 @@ struct PlannedMotor {
     steps: u64,
 }
 
-/// `cargo xtask bench motion [FILE] [--config PRINTER.CFG]`.
-pub(crate) fn motion(file: Option<PathBuf>, config: Option<PathBuf>) -> Result<()> {
+/// `cargo xtask bench motion [FILE] [--config PRINTER.CFG] [--json]`.
+pub(crate) fn motion(file: Option<PathBuf>, config: Option<PathBuf>, json: bool) -> Result<()> {
     if Command::new("valgrind").arg("--version").output().is_err() {
         println!("not run: valgrind is not on the PATH (Debian, Ubuntu: apt install valgrind)");
         return Ok(());
@@ -60,8 +60,63 @@ pub(crate) fn motion(file: Option<PathBuf>, config: Option<PathBuf>) -> Result<(
     let plan: Plan =
         serde_json::from_slice(&output.stdout).context("stepcast plan --json wrote something else")?;
     let costs = callgrind::self_costs(&fs::read_to_string(&profile).context("valgrind wrote no profile")?)?;
+    let summary = Summary::new(&plan, &costs, fs::metadata(&file)?.len());
+    if json {
+        println!("{}", serde_json::to_string_pretty(&summary)?);
+        return Ok(());
+    }
     report(&file, &plan, &costs);
+    println!("\n{:<44}{:>24}", "stage", "instructions a step");
+    for (stage, cost) in &summary.instructions_per_step {
+        println!("  {stage:<42}{cost:>24.1}");
+    }
+    println!("parsing: {:.1} instructions a byte of G-code", summary.parse_instructions_per_byte);
     Ok(())
+}
+
+/// The figures by stages of the way, and of the whole of it.
+#[derive(Serialize)]
+struct Summary {
+    moves: u64,
+    steps: u64,
+    bytes_per_step: f64,
+    instructions_per_step: BTreeMap<&'static str, f64>,
+    /// Of the file as it lies there: means nothing for a compressed one.
+    parse_instructions_per_byte: f64,
+}
+
+impl Summary {
+    fn new(plan: &Plan, costs: &SelfCosts, file_bytes: u64) -> Self {
+        let steps = plan.motors.values().map(|motor| motor.steps).sum::<u64>();
+        let mut stages = BTreeMap::<&'static str, u64>::new();
+        for ((source, function), cost) in costs {
+            let (krate, module) = place(source, function);
+            *stages.entry(stage_of(&krate, &module)).or_default() += cost;
+            *stages.entry("whole").or_default() += cost;
+        }
+        let parse = stages.get("parse").copied().unwrap_or(0);
+        let per_step = |(stage, cost): (&'static str, u64)| (stage, cost as f64 / steps.max(1) as f64);
+        Self {
+            moves: plan.moves,
+            steps,
+            bytes_per_step: plan.bytes_per_step,
+            instructions_per_step: stages.into_iter().map(per_step).collect(),
+            parse_instructions_per_byte: parse as f64 / file_bytes.max(1) as f64,
+        }
+    }
+}
+
+/// The stage of the way that a crate's module belongs to.
+fn stage_of(krate: &str, module: &str) -> &'static str {
+    let packs = ["stabbing", "compressor", "windows"];
+    match krate {
+        "gcode" | "memchr" => "parse",
+        "motion" | "printer" => "plan",
+        "steps" if packs.iter().any(|name| module.contains(name)) => "compression",
+        "steps" => "step times",
+        "wire" | "crc" => "encode",
+        _ => "libraries",
+    }
 }
 
 fn report(file: &Path, plan: &Plan, costs: &SelfCosts) {
@@ -140,6 +195,8 @@ mod tests {
         assert_eq!(stage("/rustc/abc/library/core/src/num/f64.rs", "<motion::LookAhead>::pop"), "motion");
         assert_eq!(stage("/rustc/abc/library/alloc/src/vec.rs", "alloc::vec::Vec::push"), "libraries");
         assert_eq!(stage("???", "memcpy"), "libraries");
+        assert_eq!(stage_of("steps", "steps: standard library in stabbing"), "compression");
+        assert_eq!(stage_of("steps", "steps: crossing.rs"), "step times");
         assert_eq!(place("/x/crates/steps/src/compress.rs", "f").1, "steps: compress.rs");
     }
 }

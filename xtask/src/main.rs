@@ -54,6 +54,9 @@ enum Subject {
         /// The machine to plan for [default: samples/printer.cfg]
         #[arg(long)]
         config: Option<PathBuf>,
+        /// Write the result as JSON
+        #[arg(long)]
+        json: bool,
     },
 }
 
@@ -63,7 +66,7 @@ fn main() -> ExitCode {
         Chore::Bindings { check } => bindings::run(check),
         Chore::Wasm => wasm::run(),
         Chore::Instruments => instruments::run(),
-        Chore::Bench { subject: Subject::Motion { file, config } } => bench::motion(file, config),
+        Chore::Bench { subject: Subject::Motion { file, config, json } } => bench::motion(file, config, json),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -4,18 +4,21 @@
 //! desktop printer. Order of motors: X, Y, Z, extruder, as everywhere.
 
 use printer::{
-    config::{HeaterConfig, MotorConfig, PinSpec, PrinterConfig, StepperConfig},
+    config::{HeaterConfig, Kinematics, MotorConfig, PinSpec, PrinterConfig, StepperConfig},
     error::{ErrorCode, PrinterError},
     machine::{EXTRUDER, MOTOR_NAMES},
 };
 use units::{Celsius, Mm, Ohms};
 use virtual_printer::{
-    Endstop, Fan, Filament, Heater, Machine, Mechanics, Motor, Plant, Sensor, Side, Thermistor, Wire,
+    Endstop, Fan, Filament, Gantry, Heater, Machine, Mechanics, Motor, Plant, Sensor, Side, Thermistor,
+    Towers, Wire,
 };
 
 /// What each axis moves, in kg: the carriage, the bed, the gantry.
 const MOVED_KG: [f64; 3] = [0.4, 0.8, 0.8];
-/// What the Z motor holds up, as a torque: the gantry's weight is small behind a screw.
+/// A carriage on a delta's tower with its share of the head, in kg.
+const TOWER_KG: f64 = 0.2;
+/// What hangs on a motor, as a torque: a gantry's weight is small behind a screw.
 const GRAVITY_M_S2: f64 = 9.81;
 /// At power-up an axis stands this far from its endstop, or in the middle of a shorter one.
 const START_FROM_ENDSTOP_MM: f64 = 40.0;
@@ -26,15 +29,18 @@ const CURVE_POINTS_C: [f64; 3] = [25.0, 150.0, 250.0];
 
 /// Builds the machine that a file describes. An error where the file has a part that cannot be simulated.
 pub fn machine(config: &PrinterConfig) -> Result<Machine, PrinterError> {
-    let mut machine = Machine::default();
-    for (axis, stepper) in config.steppers.iter().enumerate() {
-        machine.motors.push(axis_motor(axis, stepper));
+    let mut machine = Machine { gantry: gantry(config), ..Machine::default() };
+    let axes = axes(config);
+    let starts = machine.gantry.motors(axes.each_ref().map(|axis| axis.start));
+    for (index, (stepper, axis)) in config.steppers.iter().zip(&axes).enumerate() {
+        let start = if machine.gantry.is_coupled() { starts[index] } else { axis.start };
+        machine.motors.push(axis_motor(config, index, stepper, axis, Mm(start)));
         machine.endstops.push(Endstop {
-            name: MOTOR_NAMES[axis].to_owned(),
+            name: stepper.name.clone(),
             wire: wire(&stepper.endstop_pin),
-            motor: axis,
+            motor: index,
             side: if stepper.homing_positive_dir { Side::Max } else { Side::Min },
-            position: stepper.position_endstop,
+            position: Mm(axis.endstop),
         });
     }
     if let Some(fan) = &config.fan {
@@ -45,7 +51,7 @@ pub fn machine(config: &PrinterConfig) -> Result<Machine, PrinterError> {
             full_steps_per_rotation: extruder.motor.full_steps_per_rotation,
             ..Mechanics::extruder(extruder.motor.microsteps)
         };
-        machine.motors.push(motor(EXTRUDER, &extruder.motor, mechanics, Mm::ZERO, None));
+        machine.motors.push(motor(MOTOR_NAMES[EXTRUDER], &extruder.motor, mechanics, Mm::ZERO, None));
         machine.heaters.push(Heater {
             fan: config.fan.as_ref().map(|_| 0),
             filament: Some(Filament { motor: EXTRUDER, diameter: extruder.filament_diameter }),
@@ -58,32 +64,106 @@ pub fn machine(config: &PrinterConfig) -> Result<Machine, PrinterError> {
     Ok(machine)
 }
 
-fn axis_motor(axis: usize, stepper: &StepperConfig) -> Motor {
+/// How the machine is built.
+fn gantry(config: &PrinterConfig) -> Gantry {
+    match &config.printer.kinematics {
+        Kinematics::Cartesian => Gantry::Cartesian,
+        Kinematics::CoreXy => Gantry::CoreXy,
+        Kinematics::CoreXz => Gantry::CoreXz,
+        Kinematics::HybridCoreXy => Gantry::HybridCoreXy,
+        Kinematics::HybridCoreXz => Gantry::HybridCoreXz,
+        Kinematics::Delta(delta) => Gantry::Delta(Towers {
+            feet: delta.towers.map(|tower| {
+                let angle = tower.angle.to_radians();
+                [delta.delta_radius.0 * libm::cos(angle), delta.delta_radius.0 * libm::sin(angle)]
+            }),
+            arms: delta.towers.map(|tower| tower.arm_length.0),
+        }),
+    }
+}
+
+/// What runs between two stops, in mm.
+struct Carriage {
+    min: f64,
+    max: f64,
+    endstop: f64,
+    start: f64,
+}
+
+/// The carriages that press the endstops: of the axes, or on a delta's towers.
+fn axes(config: &PrinterConfig) -> [Carriage; 3] {
+    core::array::from_fn(|index| {
+        let stepper = &config.steppers[index];
+        let (min, max) = (stepper.position_min.0, stepper.position_max.0);
+        if let Kinematics::Delta(delta) = &config.printer.kinematics {
+            let endstop = delta.endstops()[index].0;
+            let z = &config.steppers[2];
+            let low = endstop - (z.position_max - z.position_min).0 - delta.towers[index].arm_length.0;
+            // None of them stands like the others.
+            let start = endstop - START_FROM_ENDSTOP_MM - 7.0 * index as f64;
+            return Carriage { min: low, max: endstop, endstop, start };
+        }
+        let away = START_FROM_ENDSTOP_MM.min((max - min) / 2.0);
+        let endstop = stepper.position_endstop.0;
+        let start = if stepper.homing_positive_dir { endstop - away } else { endstop + away };
+        Carriage { min, max, endstop, start }
+    })
+}
+
+/// What a motor moves, in kg, and what of that hangs on it, down to lower positions of its own.
+fn loads(gantry: &Gantry, index: usize) -> (f64, f64) {
+    let z = MOVED_KG[2];
+    match (gantry, index) {
+        // Two motors share what hangs on one belt and the other.
+        (Gantry::CoreXy, 0 | 1) => (MOVED_KG[1] / 2.0, 0.0),
+        // What hangs on a single belt is light, or it would fall without current.
+        (Gantry::HybridCoreXz, 2) => (MOVED_KG[0], MOVED_KG[0]),
+        (Gantry::CoreXz, 0) => (z / 2.0, z / 2.0),
+        (Gantry::CoreXz, 2) => (z / 2.0, -z / 2.0),
+        (Gantry::Delta(_), _) => (TOWER_KG, TOWER_KG),
+        (_, 2) => (z, z),
+        _ => (MOVED_KG[index], 0.0),
+    }
+}
+
+fn axis_motor(
+    config: &PrinterConfig,
+    index: usize,
+    stepper: &StepperConfig,
+    carriage: &Carriage,
+    start: Mm,
+) -> Motor {
+    let gantry = gantry(config);
     let mm_per_rotation = stepper.motor.rotation_distance.0 / stepper.motor.gear_ratio;
+    let (moved_kg, hanging_kg) = loads(&gantry, index);
     let mut mechanics = Mechanics {
         full_steps_per_rotation: stepper.motor.full_steps_per_rotation,
-        ..Mechanics::nema17(stepper.motor.microsteps, mm_per_rotation, MOVED_KG[axis])
+        ..Mechanics::nema17(stepper.motor.microsteps, mm_per_rotation, moved_kg)
     };
-    if axis == 2 {
-        mechanics.load_nm = MOVED_KG[2] * GRAVITY_M_S2 * mm_per_rotation / 1000.0 / std::f64::consts::TAU;
+    if hanging_kg != 0.0 {
+        mechanics.load_nm = hanging_kg * GRAVITY_M_S2 * mm_per_rotation / 1000.0 / std::f64::consts::TAU;
     }
-    let (min, max) = (stepper.position_min.0, stepper.position_max.0);
-    let away = START_FROM_ENDSTOP_MM.min((max - min) / 2.0);
-    let endstop = stepper.position_endstop.0;
-    let start = if stepper.homing_positive_dir { endstop - away } else { endstop + away };
+    let &Carriage { min, max, endstop, .. } = carriage;
     let frame = (Mm(min.min(endstop) - FRAME_MARGIN_MM), Mm(max.max(endstop) + FRAME_MARGIN_MM));
-    motor(axis, &stepper.motor, mechanics, Mm(start), Some(frame))
+    let is_alone = !gantry.is_coupled() || (0..3).all(|axis| axis == index || is_free(&gantry, index, axis));
+    motor(&stepper.name, &stepper.motor, mechanics, start, is_alone.then_some(frame))
+}
+
+/// Whether a motor stands still where only this axis moves.
+fn is_free(gantry: &Gantry, motor: usize, axis: usize) -> bool {
+    let way = core::array::from_fn(|it| f64::from(u8::from(it == axis)));
+    gantry.motors(way)[motor] == 0.0
 }
 
 fn motor(
-    index: usize,
+    name: &str,
     config: &MotorConfig,
     mechanics: Mechanics,
     start: Mm,
     frame: Option<(Mm, Mm)>,
 ) -> Motor {
     Motor {
-        name: MOTOR_NAMES[index].to_owned(),
+        name: name.to_owned(),
         step: wire(&config.step_pin),
         dir: wire(&config.dir_pin),
         enable: config.enable_pin.as_ref().map(wire),

@@ -216,6 +216,10 @@ pub enum Action {
     },
     /// Input shapers (`SET_INPUT_SHAPER`).
     InputShaper(InputShaper),
+    /// Axes that are not square (`SET_SKEW`, `SKEW_PROFILE`).
+    Skew(SkewChange),
+    /// A bed that is not flat (`BED_MESH_PROFILE`, `BED_MESH_CLEAR`).
+    BedMesh(MeshChange),
     /// The speed factor is now this (`M220`); moves that follow have it in their feed.
     SpeedFactor(f64),
     /// The flow factor is now this (`M221`); moves that follow have it in their `e`.
@@ -238,6 +242,40 @@ pub enum Action {
     Pause(PauseReason),
     /// End the print here (`CANCEL_PRINT`).
     Cancel,
+}
+
+/// What becomes of the correction for axes that are not square. Lengths are those of a printed square with its corner A
+/// towards the origin, in mm: the diagonals AC and BD, and the side AD.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SkewChange {
+    /// None from now on.
+    Clear,
+    /// That of this name in the machine file.
+    Load(String),
+    /// As measured in these planes; the others stay as they are.
+    Measured {
+        /// AB along X, AD along Y.
+        xy: Option<[f64; 3]>,
+        /// AB along X, AD along Z.
+        xz: Option<[f64; 3]>,
+        /// AB along Y, AD along Z.
+        yz: Option<[f64; 3]>,
+    },
+    /// Nothing: say what it is.
+    Report,
+    /// Nothing: say what these lengths would be.
+    Calculate([f64; 3]),
+}
+
+/// What becomes of the bed's mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MeshChange {
+    /// None from now on.
+    Clear,
+    /// That of this name in the machine file.
+    Load(String),
+    /// Nothing: say what it is.
+    Report,
 }
 
 /// New input shapers of X and Y.

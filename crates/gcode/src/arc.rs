@@ -194,6 +194,29 @@ impl Arc {
         [low, high]
     }
 
+    /// The places between its ends where it turns back along an axis: its own ends and these are all that has to be
+    /// within reach. At most four a turn.
+    pub fn extremes(&self) -> impl Iterator<Item = Position> {
+        const QUARTER: f64 = PI / 2.0;
+        let chords = self.whole();
+        let end = chords.start_angle + self.angle;
+        let (low, high) = (chords.start_angle.min(end), chords.start_angle.max(end));
+        let first = libm::ceil(low / QUARTER);
+        let count = (4.0 * (TURNS_MAX + 1.0)) as u32;
+        let quarters = (0..count).map(move |quarter| (first + f64::from(quarter)) * QUARTER);
+        quarters
+            .take_while(move |&turned| turned <= high)
+            .map(move |turned| chords.point((turned - chords.start_angle) / chords.arc.angle))
+    }
+
+    /// The arc as a single piece.
+    fn whole(&self) -> Chords {
+        let [first, second, _] = self.plane.axes();
+        let start = self.from.to_array();
+        let start_angle = angle_of([start[first], start[second]], self.centre);
+        Chords { arc: *self, radii: self.radii(), start_angle, count: 1, done: 0, at: self.from }
+    }
+
     /// Straight moves that stay within `tolerance` of the arc and end exactly where it does.
     pub fn chords(&self, tolerance: Mm) -> Chords {
         let [r0, r1] = self.radii();
@@ -204,11 +227,25 @@ impl Arc {
         let step =
             if tolerance >= radius { PI } else { 4.0 * libm::asin((tolerance / (2.0 * radius)).sqrt()) };
         let count = (self.angle.abs() / step.min(CHORD_ANGLE_MAX)).ceil().max(1.0);
-        let [first, second, _] = self.plane.axes();
-        let start = self.from.to_array();
-        let start_angle = angle_of([start[first], start[second]], self.centre);
-        Chords { arc: *self, radii: [r0, r1], start_angle, count: count as u64, done: 0, at: self.from }
+        Chords { count: count as u64, ..self.whole() }
     }
+}
+
+/// A piece of an arc: between two angles, with the straight move from its start to its end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArcPiece {
+    /// From its start to its end.
+    pub chord: Move,
+    /// The whole arc.
+    pub arc: Arc,
+    /// The angle at its start, seen from the centre, from the plane's first axis towards its second.
+    pub start_angle: f64,
+    /// The angle that it turns by.
+    pub turn: f64,
+    /// Distance from the centre at its start and at its end, mm.
+    pub radii: [f64; 2],
+    /// Whether the arc starts with it.
+    pub is_first: bool,
 }
 
 /// The chords of an arc, one after another; nothing is stored.
@@ -223,6 +260,27 @@ pub struct Chords {
 }
 
 impl Chords {
+    /// The next chord with the piece of the arc that it stands for.
+    pub fn next_piece(&mut self) -> Option<ArcPiece> {
+        if self.done == self.count {
+            return None;
+        }
+        let is_first = self.done == 0;
+        let [low, high] = [self.done, self.done + 1].map(|done| done as f64 / self.count as f64);
+        self.done += 1;
+        let to = if self.done == self.count { self.arc.to } else { self.point(high) };
+        let from = core::mem::replace(&mut self.at, to);
+        let radius = |part: f64| self.radii[0] + (self.radii[1] - self.radii[0]) * part;
+        Some(ArcPiece {
+            chord: Move { line: self.arc.line, from, to, feed: self.arc.feed, rapid: false },
+            arc: self.arc,
+            start_angle: self.start_angle + self.arc.angle * low,
+            turn: self.arc.angle * (high - low),
+            radii: [radius(low), radius(high)],
+            is_first,
+        })
+    }
+
     fn point(&self, part: f64) -> Position {
         let Arc { from, to, plane, centre, angle, .. } = &self.arc;
         let [first, second, normal] = plane.axes();
@@ -241,17 +299,7 @@ impl Iterator for Chords {
     type Item = Move;
 
     fn next(&mut self) -> Option<Move> {
-        if self.done == self.count {
-            return None;
-        }
-        self.done += 1;
-        let to = if self.done == self.count {
-            self.arc.to
-        } else {
-            self.point(self.done as f64 / self.count as f64)
-        };
-        let from = core::mem::replace(&mut self.at, to);
-        Some(Move { line: self.arc.line, from, to, feed: self.arc.feed, rapid: false })
+        self.next_piece().map(|piece| piece.chord)
     }
 
     fn size_hint(&self) -> (usize, Option<usize>) {

@@ -23,11 +23,11 @@ mod sniff;
 mod words;
 
 pub use action::{
-    Action, AxisShaper, AxisValues, Heater, InputShaper, MachineLimits, Move, ObjectAction, ObjectId,
-    PauseReason, Position, ShaperName, VelocityLimit, Wait,
+    Action, AxisShaper, AxisValues, Heater, InputShaper, MachineLimits, MeshChange, Move, ObjectAction,
+    ObjectId, PauseReason, Position, ShaperName, SkewChange, VelocityLimit, Wait,
 };
 pub use annotation::{Annotation, Feature, PictureLine};
-pub use arc::{Arc, ArcError, CHORD_TOLERANCE, CHORD_TOLERANCE_MIN, Chords, Plane};
+pub use arc::{Arc, ArcError, ArcPiece, CHORD_TOLERANCE, CHORD_TOLERANCE_MIN, Chords, Plane};
 pub use diagnostic::{Diagnostic, DiagnosticCode, Severity};
 pub use interpreter::{FirmwareRetraction, Interpreter, Settings};
 pub use lines::{LINE_BYTES_MAX, Line, LineNumber, Lines};

@@ -8,8 +8,11 @@
 //! Knows no minimum cruise ratio: that costs time on purpose. Holds all moves between two stops; a measure, not for printing.
 //! Lengths in mm, times in s, squared speeds in mm²/s².
 
+mod curve;
+
 use crate::motor::{Demand, MotorAbility};
-use crate::{Limits, MoveRequest};
+use crate::{Bend, Limits, MoveRequest};
+use curve::Curve;
 use units::Seconds;
 
 /// The most moves that are kept at once: beyond it the path is cut, which only the moves next to the cut notice.
@@ -26,8 +29,16 @@ const LENGTH_MIN_MM: f64 = 1e-9;
 /// A move as the bound sees it.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    direction: [f64; 4],
+    /// The directions at its start and at its end.
+    headings: [[f64; 4]; 2],
+    /// The most that each coordinate changes per mm.
+    shares: [f64; 4],
     length: f64,
+    /// Length of the arc that it is part of, or its own.
+    whole: f64,
+    /// It goes on with the arc of the move before.
+    continues: bool,
+    bends: bool,
     travels: bool,
     cruise_v2: f64,
     accel: f64,
@@ -57,8 +68,13 @@ impl Bound {
 
     /// Takes a move under its limits.
     pub fn push(&mut self, request: &MoveRequest, limits: &Limits) {
+        self.push_along(request, None, limits);
+    }
+
+    /// Takes a move along an arc under its limits.
+    pub fn push_along(&mut self, request: &MoveRequest, bend: Option<&Bend>, limits: &Limits) {
         let from = self.at.unwrap_or(request.from);
-        let Some(mut way) = self.way(from, request, limits) else { return };
+        let Some(mut way) = self.way(from, request, bend, limits) else { return };
         self.at = Some(request.to);
         way.corner_v2 = self.ways.last().map_or(way.rest_v2, |before| self.corner(before, &way));
         if !self.ways.is_empty() && (way.corner_v2 == 0.0 || self.ways.len() >= MOVES_MAX) {
@@ -84,16 +100,29 @@ impl Bound {
         Seconds(self.total)
     }
 
-    fn way(&self, from: [f64; 4], request: &MoveRequest, limits: &Limits) -> Option<Way> {
+    fn way(
+        &self,
+        from: [f64; 4],
+        request: &MoveRequest,
+        bend: Option<&Bend>,
+        limits: &Limits,
+    ) -> Option<Way> {
         let delta: [f64; 4] = core::array::from_fn(|axis| request.to[axis] - from[axis]);
-        let travel = (delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2]).sqrt();
+        let straight = (delta[0] * delta[0] + delta[1] * delta[1] + delta[2] * delta[2]).sqrt();
+        let curve = bend.filter(|_| straight >= LENGTH_MIN_MM).map(Curve::new);
+        let travel = curve.map_or(straight, |curve| curve.length);
         let travels = travel >= LENGTH_MIN_MM;
         let length = if travels { travel } else { delta[3].abs() };
         if length < LENGTH_MIN_MM {
             return None;
         }
-        let direction: [f64; 4] =
+        let mut direction: [f64; 4] =
             core::array::from_fn(|axis| if travels || axis == 3 { delta[axis] / length } else { 0.0 });
+        let mut headings = [direction; 2];
+        if let Some(curve) = &curve {
+            direction[..3].copy_from_slice(&curve.shares);
+            headings = curve.headings.map(|[x, y, z]| [x, y, z, direction[3]]);
+        }
         let mut speed = request.feed.0;
         let mut accel = f64::INFINITY;
         let mut limit = |share: f64, (velocity, acceleration): (f64, f64)| {
@@ -109,17 +138,26 @@ impl Bound {
             limit(direction[1], y);
             limit(direction[2], (limits.max_z_velocity.0, limits.max_z_accel.0));
         }
+        if let Some(curve) = &curve {
+            speed = speed.min(self.turning(curve, limits, speed));
+        }
         let extruder = &limits.extruder;
-        if direction[3] < 0.0 || (direction[0] == 0.0 && direction[1] == 0.0) {
-            limit(direction[3], (extruder.max_extrude_only_velocity.0, extruder.max_extrude_only_accel.0));
+        if direction[3] != 0.0 && (direction[3] < 0.0 || (direction[0] == 0.0 && direction[1] == 0.0)) {
+            let share = direction[3].abs();
+            speed = speed.min(extruder.max_extrude_only_velocity.0 / share);
+            accel = accel.min(extruder.max_extrude_only_accel.0 / share);
         }
         for (motor, share) in self.driven(&direction) {
             speed = speed.min(motor.calm(motor.top().0.min(speed * share)) / share);
         }
         let rest = self.jump(&direction, extruder.instantaneous_corner_velocity.0).min(speed);
         Some(Way {
-            direction,
+            headings,
+            shares: direction,
             length,
+            whole: bend.map_or(length, |bend| bend.arc_length.max(length)),
+            continues: bend.is_some_and(|bend| bend.continues),
+            bends: curve.is_some(),
             travels,
             cruise_v2: speed * speed,
             accel,
@@ -128,6 +166,20 @@ impl Bound {
             extruder_jump: extruder.instantaneous_corner_velocity.0,
             rest_v2: rest * rest,
         })
+    }
+
+    /// The highest speed at which the path, each axis and each motor can turn as an arc does.
+    fn turning(&self, curve: &Curve, limits: &Limits, top: f64) -> f64 {
+        let [x, y] = limits.max_xy_accel;
+        let of_axes = [x.0, y.0, limits.max_z_accel.0];
+        let asked = of_axes.iter().zip(curve.bends).chain([(&limits.max_accel.0, curve.curvature)]);
+        let mut v2 = asked.filter(|pair| pair.1 > 0.0).fold(top * top, |v2, (a, bend)| v2.min(a / bend));
+        for (axis, motor) in self.motors.iter().take(3).enumerate() {
+            if let (Some(motor), true) = (motor, curve.bends[axis] > 0.0) {
+                v2 = motor.bend_limit(v2, curve.bends[axis], curve.shares[axis], true);
+            }
+        }
+        v2.sqrt()
     }
 
     /// The speed that a change of direction from rest, or of that size, may begin with: what each motor can jump by. One of
@@ -155,26 +207,30 @@ impl Bound {
         if !(a.travels && b.travels) {
             return 0.0;
         }
-        let dot: f64 = (0..3).map(|axis| a.direction[axis] * b.direction[axis]).sum();
+        let mut v2 = a.cruise_v2.min(b.cruise_v2);
+        let (before, after) = (a.headings[1], b.headings[0]);
+        let dot: f64 = (0..3).map(|axis| before[axis] * after[axis]).sum();
+        let jump = |axis: usize| (before[axis] - after[axis]).abs();
+        let speed = b.extruder_jump / jump(3);
+        v2 = v2.min(speed * speed);
+        if b.continues && a.bends && b.bends && dot > 0.99 {
+            return v2;
+        }
         // Half the angle between the two, a right angle where they go straight on.
         let half = 0.5 * (core::f64::consts::PI - libm::acos(dot.clamp(-1.0, 1.0)));
         let (sin, tan) = (libm::sin(half), libm::tan(half));
-        let mut v2 = a.cruise_v2.min(b.cruise_v2);
         for way in [a, b] {
             if sin < 1.0 {
                 v2 = v2.min(way.deviation * way.accel * sin / (1.0 - sin));
             }
-            v2 = v2.min(0.5 * way.length * way.accel * tan);
+            v2 = v2.min(0.5 * way.whole * way.accel * tan);
         }
-        let jump = |axis: usize| (a.direction[axis] - b.direction[axis]).abs();
-        let speed = b.extruder_jump / jump(3);
-        v2 = v2.min(speed * speed);
         for (axis, motor) in self.motors.iter().enumerate() {
             let (Some(motor), true) = (motor, jump(axis) > 0.0) else { continue };
             let speed = motor.start().0 / jump(axis);
             v2 = v2.min(speed * speed);
-            let share = a.direction[axis].abs().max(b.direction[axis].abs());
-            v2 = motor.bend_limit(v2, 2.0 * jump(axis) / (a.length + b.length), share, true);
+            let share = a.shares[axis].abs().max(b.shares[axis].abs());
+            v2 = motor.bend_limit(v2, 2.0 * jump(axis) / (a.whole + b.whole), share, true);
         }
         v2
     }
@@ -182,7 +238,7 @@ impl Bound {
     /// What a move can speed up or slow down by at a squared speed.
     fn accel(&self, way: &Way, v2: f64, demand: Demand) -> f64 {
         let speed = v2.sqrt();
-        self.driven(&way.direction)
+        self.driven(&way.shares)
             .fold(way.accel, |accel, (motor, share)| accel.min(motor.exact(speed * share, demand) / share))
     }
 

@@ -42,8 +42,8 @@ pub(crate) struct JerkLimiter {
     waiting_time: f64,
     /// Speed at the start of the first of them.
     speed: f64,
-    /// The direction of the move before it.
-    before: Option<[f64; 4]>,
+    /// The direction in which the move before it ends.
+    before: Option<[f64; 3]>,
     /// Print time at which the last move that was given out ends.
     print_time: f64,
 }
@@ -122,7 +122,7 @@ impl JerkLimiter {
             self.print_time = cut(&moves[stretch.first..stretch.last], &phases, self.print_time, out);
         }
         self.speed = window.speed(end);
-        self.before = end.checked_sub(1).map(|last| moves[last].direction);
+        self.before = end.checked_sub(1).map(|last| moves[last].heading(true));
         self.waiting.drain(..end);
         self.waiting_time = self.waiting.iter().map(PlannedMove::duration).sum();
     }
@@ -132,7 +132,7 @@ impl JerkLimiter {
 struct Window<'a> {
     moves: &'a [PlannedMove],
     /// The direction of the path before the first of them.
-    before: Option<[f64; 4]>,
+    before: Option<[f64; 3]>,
     jerk: f64,
     /// Path up to each junction, from the first move's start.
     distances: Vec<f64>,
@@ -157,7 +157,7 @@ impl Shape {
 }
 
 impl<'a> Window<'a> {
-    fn new(moves: &'a [PlannedMove], speed: f64, before: Option<[f64; 4]>, jerk: f64) -> Self {
+    fn new(moves: &'a [PlannedMove], speed: f64, before: Option<[f64; 3]>, jerk: f64) -> Self {
         let mut distances = vec![0.0];
         let mut distance = 0.0;
         for one in moves {
@@ -223,12 +223,13 @@ impl<'a> Window<'a> {
     /// Whether the path bends at a junction.
     fn is_corner(&self, junction: usize) -> bool {
         let before = if junction == 0 {
-            self.before.as_ref()
+            self.before
         } else {
-            self.moves.get(junction - 1).map(|one| &one.direction)
+            self.moves.get(junction - 1).map(|one| one.heading(true))
         };
         let (Some(before), Some(after)) = (before, self.moves.get(junction)) else { return false };
-        let dot: f64 = (0..3).map(|axis| before[axis] * after.direction[axis]).sum();
+        let after = after.heading(false);
+        let dot: f64 = (0..3).map(|axis| before[axis] * after[axis]).sum();
         dot < CORNER_COS && self.speed(junction) > 0.0
     }
 
@@ -307,6 +308,8 @@ impl<'a> Window<'a> {
         if knot < end && safe < self.speed(knot) {
             self.speeds[knot] = Some(safe);
             self.keep_in_reach();
+            // From a lower speed more acceleration builds up, and another junction may be passed faster than before.
+            self.solve();
         }
         knot
     }

@@ -2,7 +2,7 @@
 
 use crate::ability::{Ability, peak};
 use crate::motor::{Demand, MotorAbility};
-use crate::{Limits, MoveRequest};
+use crate::{Bend, Limits, MoveRequest};
 use nalgebra::{Vector3, Vector4};
 
 /// Shorter moves (mm) are no moves: less than rounding in a file could mean.
@@ -10,6 +10,8 @@ pub(crate) const LENGTH_MIN_MM: f64 = 1e-9;
 
 /// The place of the filament among the coordinates.
 const EXTRUDER: usize = 3;
+/// The cosine of the angle up to which pieces of one arc go on into each other.
+const SAME_HEADING: f64 = 0.99;
 
 /// A move that waits in the window: what limits it, in squared speeds (mm²/s²).
 #[derive(Clone, Copy, Debug)]
@@ -17,8 +19,12 @@ pub(crate) struct Entry {
     pub(crate) tag: u32,
     pub(crate) from: [f64; 4],
     pub(crate) to: [f64; 4],
-    /// Change of each coordinate per mm of path.
+    /// Change of each coordinate per mm of path; of an arc's x, y and z: as a unit vector from its start to its end.
     pub(crate) direction: Vector4<f64>,
+    /// The most that each coordinate changes per mm of path, wherever on it.
+    shares: Vector4<f64>,
+    /// The path where it is no straight line.
+    pub(crate) bend: Option<Bend>,
     pub(crate) length: f64,
     pub(crate) accel: f64,
     /// Whether the head travels (otherwise the filament alone moves).
@@ -40,44 +46,56 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    /// The move under `limits`, starting from rest; `None` where nothing moves.
+    /// The move under `limits`, along `bend` if there is one, starting from rest; `None` where nothing moves.
     pub(crate) fn new(
         request: &MoveRequest,
+        bend: Option<&Bend>,
         limits: &Limits,
         motors: &[Option<MotorAbility>],
     ) -> Option<Self> {
         let delta = Vector4::from(request.to) - Vector4::from(request.from);
-        let travel_mm = norm(&delta.xyz());
+        let straight_mm = norm(&delta.xyz());
+        let bend = bend.filter(|_| straight_mm >= LENGTH_MIN_MM);
+        let travel_mm = bend.map_or(straight_mm, Bend::length);
         let travels = travel_mm >= LENGTH_MIN_MM;
         let length = if travels { travel_mm } else { delta.w.abs() };
         if length < LENGTH_MIN_MM {
             return None;
         }
         let mut direction = delta / length;
+        let mut shares = direction;
         let mut velocity = request.feed.0;
         let mut accel = f64::INFINITY;
+        if let Some(bend) = bend {
+            direction = (delta.xyz() / straight_mm).push(direction.w);
+            shares = bend.shares().push(direction.w);
+        }
         if travels {
             velocity = velocity.min(limits.max_velocity.0);
             accel = limits.max_accel.0;
         } else {
             direction = Vector4::new(0.0, 0.0, 0.0, direction.w);
+            shares = direction;
         }
-        if travels && direction.z != 0.0 {
-            let path_per_z = 1.0 / direction.z.abs();
+        if travels && shares.z != 0.0 {
+            let path_per_z = 1.0 / shares.z.abs();
             velocity = velocity.min(limits.max_z_velocity.0 * path_per_z);
             accel = accel.min(limits.max_z_accel.0 * path_per_z);
         }
         if travels {
             for axis in 0..2 {
-                let share = direction[axis].abs();
+                let share = shares[axis].abs();
                 if share > 0.0 {
                     velocity = velocity.min(limits.max_xy_velocity[axis].0 / share);
                     accel = accel.min(limits.max_xy_accel[axis].0 / share);
                 }
             }
         }
+        if let Some(bend) = bend {
+            velocity = velocity.min(turning_velocity(bend, limits, motors, &shares, velocity));
+        }
         // The filament sets the limits where it moves without x and y, and where it is pulled back.
-        let filament_leads = direction.w < 0.0 || (direction.x == 0.0 && direction.y == 0.0);
+        let filament_leads = direction.w < 0.0 || (shares.x == 0.0 && shares.y == 0.0);
         if direction.w != 0.0 && filament_leads {
             let path_per_e = 1.0 / direction.w.abs();
             velocity = velocity.min(limits.extruder.max_extrude_only_velocity.0 * path_per_e);
@@ -86,7 +104,7 @@ impl Entry {
         let corner_extruder = limits.extruder.instantaneous_corner_velocity.0;
         let mut jump = if motors.is_empty() { 0.0 } else { velocity };
         for (axis, motor) in motors.iter().enumerate() {
-            let share = direction[axis].abs();
+            let share = shares[axis].abs();
             if share == 0.0 {
                 continue;
             }
@@ -107,6 +125,8 @@ impl Entry {
             from: request.from,
             to: request.to,
             direction,
+            shares,
+            bend: bend.copied(),
             length,
             accel,
             travels,
@@ -123,22 +143,22 @@ impl Entry {
 
     /// What the move can speed up by.
     pub(crate) const fn speeding<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
-        Ability::new(self.accel, &self.direction, motors, Demand::Speed)
+        Ability::new(self.accel, &self.shares, motors, Demand::Speed)
     }
 
     /// What it can slow down by.
     pub(crate) const fn slowing<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
-        Ability::new(self.accel, &self.direction, motors, Demand::Slow)
+        Ability::new(self.accel, &self.shares, motors, Demand::Slow)
     }
 
     /// The gentler speeding up of the virtual look-ahead.
     pub(crate) const fn smoothed_speeding<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
-        Ability::new(self.smoothed_accel, &self.direction, motors, Demand::Speed)
+        Ability::new(self.smoothed_accel, &self.shares, motors, Demand::Speed)
     }
 
     /// The same for slowing down.
     pub(crate) const fn smoothed_slowing<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
-        Ability::new(self.smoothed_accel, &self.direction, motors, Demand::Slow)
+        Ability::new(self.smoothed_accel, &self.shares, motors, Demand::Slow)
     }
 
     /// The top of the move between two squared speeds, should it not cruise.
@@ -168,13 +188,19 @@ impl Entry {
             return 0.0;
         }
         let mut limit = self.cruise_limit.min(previous.cruise_limit);
+        let (before, after) = (previous.heading(true), self.heading(false));
         let extrusion_jump = (self.direction.w - previous.direction.w).abs();
         if extrusion_jump > 0.0 {
             let speed = self.corner_extruder / extrusion_jump;
             limit = limit.min(speed * speed);
         }
+        // Within an arc there is no corner.
+        let continues = self.bend.is_some_and(|bend| bend.continues) && previous.bend.is_some();
+        if continues && after.dot(&before) > SAME_HEADING {
+            return limit;
+        }
         // θ is the angle between the two moves, π where they go straight on.
-        let cos_theta = -self.direction.xyz().dot(&previous.direction.xyz());
+        let cos_theta = -after.dot(&before);
         let sin_half = (0.5 * (1.0 - cos_theta)).max(0.0).sqrt();
         let cos_half = (0.5 * (1.0 + cos_theta)).max(0.0).sqrt();
         let beyond_sin = 1.0 - sin_half;
@@ -184,22 +210,62 @@ impl Entry {
             for entry in [self, previous] {
                 limit = limit.min(radius * entry.junction_deviation * entry.accel);
                 // The rounding circle may touch no move beyond its middle.
-                limit = limit.min(0.5 * entry.length * entry.accel * tan_half);
+                limit = limit.min(0.5 * entry.whole_length() * entry.accel * tan_half);
             }
         }
         for (axis, motor) in motors.iter().enumerate() {
-            let jump = (self.direction[axis] - previous.direction[axis]).abs();
+            let jump = match axis {
+                EXTRUDER => extrusion_jump,
+                _ => (after[axis] - before[axis]).abs(),
+            };
             if let (Some(motor), true) = (motor, jump > 0.0) {
                 let speed = motor.start().0 / jump;
                 limit = limit.min(speed * speed);
                 // On a curve the motor is asked for what turning takes, however small each corner is.
-                let bend = jump / (0.5 * (self.length + previous.length));
-                let share = self.direction[axis].abs().max(previous.direction[axis].abs());
+                let bend = jump / (0.5 * (self.whole_length() + previous.whole_length()));
+                let share = self.shares[axis].abs().max(previous.shares[axis].abs());
                 limit = motor.bend_limit(limit, bend, share, false);
             }
         }
         limit
     }
+
+    /// The direction of its path at its start or at its end.
+    fn heading(&self, at_end: bool) -> Vector3<f64> {
+        self.bend.map_or_else(|| self.direction.xyz(), |bend| bend.tangent(at_end).into())
+    }
+
+    /// Its length, or that of the arc that it is a piece of.
+    fn whole_length(&self) -> f64 {
+        self.bend.map_or(self.length, |bend| bend.arc_length.max(self.length))
+    }
+}
+
+/// The highest speed along an arc, up to `top`: turning asks for v² times the curvature, of the path and of each axis.
+fn turning_velocity(
+    bend: &Bend,
+    limits: &Limits,
+    motors: &[Option<MotorAbility>],
+    shares: &Vector4<f64>,
+    top: f64,
+) -> f64 {
+    let mut v2 = top * top;
+    let mut hold = |accel: f64, curvature: f64| {
+        if curvature > 0.0 {
+            v2 = v2.min(accel / curvature);
+        }
+    };
+    let curvatures = bend.curvatures();
+    hold(limits.max_accel.0, bend.curvature());
+    hold(limits.max_xy_accel[0].0, curvatures.x);
+    hold(limits.max_xy_accel[1].0, curvatures.y);
+    hold(limits.max_z_accel.0, curvatures.z);
+    for (axis, motor) in motors.iter().take(EXTRUDER).enumerate() {
+        if let (Some(motor), true) = (motor, curvatures[axis] > 0.0) {
+            v2 = motor.bend_limit(v2, curvatures[axis], shares[axis].abs(), false);
+        }
+    }
+    v2.sqrt()
 }
 
 /// Length of a vector. Not nalgebra's `norm`: this is exactly rounded the same way on every platform.

@@ -12,6 +12,7 @@
 //! speeds, so that with constant acceleration `v² = v₀² + 2·a·d`.
 
 mod ability;
+mod bend;
 mod bound;
 mod jerk;
 mod junction;
@@ -22,6 +23,7 @@ mod planned;
 mod s_curve;
 mod window;
 
+pub use bend::{BEND_ANGLE_MAX, Bend};
 pub use bound::Bound;
 pub use limits::{ExtruderLimits, Limits, LimitsError};
 pub use look_ahead::{
@@ -30,6 +32,8 @@ pub use look_ahead::{
 pub use motor::{Demand, MotorAbility, TORQUE_POINTS_MAX, Torque, TorqueError};
 pub use planned::{Phase, PlannedMove};
 
+#[cfg(test)]
+mod bend_tests;
 #[cfg(test)]
 mod jerk_tests;
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::jerk::JerkLimiter;
 use crate::junction::Entry;
 use crate::window::Window;
-use crate::{Limits, LimitsError, MotorAbility, PlannedMove};
+use crate::{Bend, Limits, LimitsError, MotorAbility, PlannedMove};
 use std::collections::VecDeque;
 use thiserror::Error;
 use units::{MmPerS, MmPerS3, Seconds};
@@ -158,11 +158,19 @@ impl LookAhead {
 
     /// Takes a move. One that goes nowhere (less than 10⁻⁹ mm) is dropped without a word.
     pub fn push(&mut self, request: &MoveRequest) -> Result<(), MoveError> {
+        self.push_along(request, None)
+    }
+
+    /// The same for a move whose path is a piece of an arc. One that does not [fit](Bend::fits) its ends is refused.
+    pub fn push_along(&mut self, request: &MoveRequest, bend: Option<&Bend>) -> Result<(), MoveError> {
         self.check(request)?;
+        if bend.is_some_and(|bend| !bend.fits(&request.from, &request.to)) {
+            return Err(MoveError::Gap);
+        }
         // A dropped move is not forgotten: the next one starts where the plan ends.
         let from = self.planned_position.unwrap_or(request.from);
-        let Some(entry) = Entry::new(&MoveRequest { from, ..*request }, &self.limits, self.window.motors())
-        else {
+        let request = &MoveRequest { from, ..*request };
+        let Some(entry) = Entry::new(request, bend, &self.limits, self.window.motors()) else {
             self.planned_position = Some(from);
             self.position = Some(request.to);
             return Ok(());

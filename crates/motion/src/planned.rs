@@ -1,5 +1,6 @@
 //! A move with its place in time: it speeds up, cruises and slows down.
 
+use crate::Bend;
 use crate::junction::Entry;
 use crate::motor::MotorAbility;
 
@@ -32,7 +33,7 @@ impl Phase {
     }
 }
 
-/// One move, planned: it speeds up, cruises and slows down along a straight line. Any of the three may take no time.
+/// One move, planned: it speeds up, cruises and slows down along a straight line or a piece of an arc. Any of the three may take no time.
 ///
 /// Times in seconds of print time (from the start of the run of motion), lengths in mm, speeds in mm/s along the path,
 /// accelerations in mm/s².
@@ -44,7 +45,8 @@ pub struct PlannedMove {
     pub from: [f64; 4],
     /// Where it ends, exactly.
     pub to: [f64; 4],
-    /// Change of x, y, z and e per mm of path. The path of a move of the filament alone is the filament's.
+    /// Change of x, y, z and e per mm of path. The path of a move of the filament alone is the filament's. Where
+    /// the path bends, x, y and z are a unit vector from its start to its end: see [`Self::directions`].
     pub direction: [f64; 4],
     /// Length of the path.
     pub length: f64,
@@ -66,9 +68,25 @@ pub struct PlannedMove {
     pub accel: f64,
     /// The phases of a move whose ramps are not even; `None` where the numbers above say all: see [`Self::phases`].
     pub shape: Option<Box<[Phase]>>,
+    /// The path, where it is no straight line.
+    pub bend: Option<Box<Bend>>,
 }
 
 impl PlannedMove {
+    /// Changes of x, y, z and e per mm of path, among which are those at which a motor that follows one coordinate, or two
+    /// alike, goes fastest.
+    pub fn directions(&self) -> impl Iterator<Item = [f64; 4]> {
+        let straight = self.bend.is_none().then_some(self.direction);
+        let bent = self.bend.iter().flat_map(|bend| bend.directions());
+        straight.into_iter().chain(bent.map(|[x, y, z]| [x, y, z, self.direction[3]]))
+    }
+
+    /// The direction of its path in space at its start or at its end.
+    pub(crate) fn heading(&self, at_end: bool) -> [f64; 3] {
+        let [x, y, z, _] = self.direction;
+        self.bend.as_ref().map_or([x, y, z], |bend| bend.tangent(at_end))
+    }
+
     /// How long it takes, in seconds.
     pub const fn duration(&self) -> f64 {
         self.accel_time + self.cruise_time + self.decel_time
@@ -161,6 +179,7 @@ impl PlannedMove {
             end_velocity,
             accel: entry.accel,
             shape: None,
+            bend: entry.bend.map(Box::new),
         };
         if motors.is_empty() {
             planned.shape_trapezoid(start_v2, cruise_v2, end_v2);

@@ -337,7 +337,7 @@ proptest! {
         let mut at = [0.0; 4];
         for request in &requests {
             let request = MoveRequest { from: at, ..*request };
-            if let Some(entry) = crate::junction::Entry::new(&request, &limits, &[]) {
+            if let Some(entry) = crate::junction::Entry::new(&request, None, &limits, &[]) {
                 at = request.to;
                 whole.push(entry);
             }

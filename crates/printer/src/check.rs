@@ -6,18 +6,20 @@
 //! costs no more memory than one with a thousand.
 
 use gcode::{
-    Action, CHORD_TOLERANCE, Diagnostic, Heater, Interpreter, LineNumber, Lines, Move, Settings, Severity,
-    VelocityLimit,
+    Action, Arc, CHORD_TOLERANCE, Diagnostic, Heater, Interpreter, LineNumber, Lines, Move, Settings,
+    Severity, VelocityLimit,
 };
-use motion::Limits;
+use motion::{Bend, Limits};
 use units::Celsius;
 
 use crate::{
+    arcs,
     config::{HeaterConfig, PrinterConfig},
     error::{ErrorCode, PrinterError},
     machine,
     planner::{ExtrusionPermit, Guard, PLAN_CLOCK},
     step_rate::StepRates,
+    transform::Transform,
 };
 
 /// The most findings of each kind that are kept; the rest are counted.
@@ -83,9 +85,10 @@ impl Speeds {
         }
     }
 
-    fn judge(&self, mv: &Move) -> Result<(), PrinterError> {
+    fn judge(&self, mv: &Move, bend: Option<&Bend>) -> Result<(), PrinterError> {
         let (from, to) = (mv.from.to_array(), mv.to.to_array());
-        self.step_rates.judge_request(from, to, mv.feed, &self.limits, mv.line)
+        arcs::straight_ends(from, to, bend)
+            .try_for_each(|end| self.step_rates.judge_request(from, end, mv.feed, &self.limits, mv.line))
     }
 }
 
@@ -94,6 +97,8 @@ impl Speeds {
 pub struct Checker {
     config: Option<PrinterConfig>,
     guard: Option<Guard>,
+    /// From the file's coordinates to the machine's.
+    transform: Transform,
     speeds: Option<Speeds>,
     lines: Lines,
     interpreter: Interpreter,
@@ -110,6 +115,7 @@ impl Checker {
         Self {
             config: config.cloned(),
             guard: config.map(Guard::new),
+            transform: Transform::default(),
             speeds: config.map(Speeds::new),
             lines: Lines::new(),
             interpreter: Interpreter::new(settings),
@@ -224,8 +230,8 @@ impl Checker {
 
     fn act(&mut self, action: &Action, line: LineNumber) {
         match *action {
-            Action::Move(ref mv) => self.judge(mv),
-            Action::Arc(ref arc) => arc.chords(CHORD_TOLERANCE).for_each(|chord| self.judge(&chord)),
+            Action::Move(ref mv) => self.judge(mv, None),
+            Action::Arc(ref arc) => self.judge_arc(arc),
             Action::Home { x, y, z } => self.home([x, y, z]),
             Action::SetTemperature { heater, target, .. } => self.target(heater, target, line),
             Action::WaitForTemperature { heater, .. } => _ = self.limits_of(heater, line),
@@ -235,6 +241,13 @@ impl Checker {
                 }
             }
             Action::TurnOffHeaters => self.nozzle = Celsius::ZERO,
+            Action::Skew(_) | Action::BedMesh(_) => {
+                if let Some(config) = &self.config
+                    && let Err(problem) = self.transform.set(action, &config.profiles)
+                {
+                    self.error(ErrorCode::NoSuchProfile, problem, Some(line.0));
+                }
+            }
             Action::MotorsOff { x, y, z, .. } => {
                 if let Some(guard) = &mut self.guard {
                     let off = [x, y, z];
@@ -249,7 +262,7 @@ impl Checker {
         }
     }
 
-    fn judge(&mut self, mv: &Move) {
+    fn judge(&mut self, mv: &Move, bend: Option<&Bend>) {
         self.report.moves += 1;
         let filament = mv.to.e - mv.from.e;
         self.report.filament_mm += filament;
@@ -263,14 +276,32 @@ impl Checker {
                 }
             }
         }
-        let allowed = self.guard.as_ref().map_or(Ok(()), |guard| guard.judge(mv));
-        let possible = self.speeds.as_ref().map_or(Ok(()), |speeds| speeds.judge(mv));
+        let allowed = self.guard.as_ref().map_or(Ok(()), |guard| judge(guard, &self.transform, mv));
+        let possible = self.speeds.as_ref().map_or(Ok(()), |speeds| speeds.judge(mv, bend));
         if let Err(error) = allowed.and(possible) {
             self.keep(error);
         }
     }
 
+    /// An arc may lead out of the machine between two places that are in it.
+    fn judge_arc(&mut self, arc: &Arc) {
+        if let Some(guard) = &self.guard {
+            let place = |at: gcode::Position| self.transform.machine_from_gcode([at.x, at.y, at.z]);
+            let reach = |to: gcode::Position| guard.judge_travel(place(arc.from), place(to), arc.line);
+            if let Err(error) = arc.extremes().try_for_each(reach) {
+                self.keep(error);
+            }
+        }
+        let mut chords = arc.chords(CHORD_TOLERANCE);
+        while let Some(piece) = chords.next_piece() {
+            let bend = arcs::bend(&piece);
+            let fits = bend.fits(&piece.chord.from.to_array(), &piece.chord.to.to_array());
+            self.judge(&piece.chord, (fits && self.transform.is_identity()).then_some(&bend));
+        }
+    }
+
     fn home(&mut self, axes: [bool; 3]) {
+        let axes = self.config.as_ref().map_or(axes, |config| machine::homed_together(config, axes));
         let mut at = [None; 3];
         for axis in (0..3).filter(|&axis| axes[axis]) {
             at[axis] =
@@ -322,6 +353,23 @@ impl Checker {
             };
         }
     }
+}
+
+/// Why a move may not be made, if so: where the machine goes for it, and what it extrudes.
+fn judge(guard: &Guard, transform: &Transform, mv: &Move) -> Result<(), PrinterError> {
+    if transform.is_identity() {
+        return guard.judge(mv);
+    }
+    let (from, to) = (mv.from.to_array(), mv.to.to_array());
+    if from[..3] != to[..3] {
+        let [x, y, z, _] = from;
+        let mut at = transform.machine_from_gcode([x, y, z]);
+        for [x, y, z, _] in transform.pieces(from, to) {
+            guard.judge_travel(at, [x, y, z], mv.line)?;
+            at = [x, y, z];
+        }
+    }
+    guard.judge_extrusion(mv)
 }
 
 #[cfg(test)]

@@ -93,11 +93,14 @@ catalogue! {
     NoSuchHeater, "no-such-heater":
         "The file heats something that this printer does not have", REFUSED,
         "Slice for this printer, or add the heater to printer.cfg.";
+    NoSuchProfile, "no-such-profile":
+        "A line loads a skew or a bed mesh that cannot be had", REFUSED,
+        "Write that section into printer.cfg, or take the line out of the slicer's start G-code.";
     ColdExtrusion, "cold-extrusion":
         "Filament was to be pushed through a nozzle below min_extrude_temp", REFUSED,
         "Heat the nozzle first (M109 before the first extrusion). Lower min_extrude_temp only for materials that melt colder.";
     ExtrusionTooLong, "extrusion-too-long":
-        "More filament was to be pushed in one move than max_extrude_only_distance allows", REFUSED,
+        "More filament was to be pushed or pulled back in one move than max_extrude_only_distance allows", REFUSED,
         "Check that the file uses relative or absolute extrusion as it says (M82, M83); if the length is meant, raise max_extrude_only_distance.";
     ExtrusionTooThick, "extrusion-too-thick":
         "A move extrudes more than max_extrude_cross_section allows", REFUSED,

@@ -81,6 +81,16 @@ pub(crate) struct PlanArgs {
     /// How early or late a step may come, in µs (and never more than a quarter of the gap to its neighbours); 25 is usual
     #[arg(long, value_name = "US", value_parser = step_error)]
     pub(crate) step_error_us: Option<f64>,
+    /// With `--json`: say what each layer takes, too
+    #[arg(long, requires = "json")]
+    pub(crate) layers: bool,
+    /// Write position, speed and acceleration of each axis over time into this file (CSV), as the motors get them: behind
+    /// pressure advance and input shapers
+    #[arg(long, value_name = "FILE")]
+    pub(crate) trace: Option<PathBuf>,
+    /// How far apart the rows of `--trace` are, in ms
+    #[arg(long, value_name = "MS", default_value_t = 1.0, value_parser = trace_step, requires = "trace")]
+    pub(crate) trace_step_ms: f64,
     /// Write the blocks that would be sent to a board into this file
     #[arg(long, value_name = "FILE")]
     pub(crate) dump_stream: Option<PathBuf>,
@@ -269,6 +279,10 @@ fn ratio(text: &str) -> Result<f64, String> {
 
 fn step_error(text: &str) -> Result<f64, String> {
     number(text, "a time from 0 to 1000 µs", |value| (0.0..=1000.0).contains(&value))
+}
+
+fn trace_step(text: &str) -> Result<f64, String> {
+    number(text, "a time from 0.01 to 10000 ms", |value| (0.01..=1e4).contains(&value))
 }
 
 fn number(text: &str, what: &str, fits: impl Fn(f64) -> bool) -> Result<f64, String> {

@@ -11,6 +11,7 @@ mod input;
 mod plan;
 mod simulate;
 mod torque;
+mod trace_file;
 mod virtual_printer;
 
 use std::process::ExitCode;

@@ -12,7 +12,7 @@ use std::{
 use anyhow::Context;
 use printer::{
     machine::MOTOR_NAMES,
-    planner::{PlanOptions, PlanReport, PlanStream, Ramps},
+    planner::{LayerTotal, PlanOptions, PlanReport, PlanStream, Ramps, Total},
 };
 use serde::Serialize;
 use units::{MmPerS3, Seconds};
@@ -22,6 +22,7 @@ use crate::{
     config_file,
     console::{self, Progress},
     input::Input,
+    trace_file::TraceFile,
 };
 
 /// The result as JSON; the keys are stable.
@@ -35,6 +36,25 @@ struct Report {
     bytes: u64,
     bytes_per_step: f64,
     max_step_error_us: f64,
+    filament_mm: f64,
+    features: Vec<Feature>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    layers: Option<Vec<Layer>>,
+}
+
+/// What a kind of extrusion takes; also travel, retraction and pause.
+#[derive(Debug, Serialize)]
+struct Feature {
+    name: &'static str,
+    time_s: f64,
+    filament_mm: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Layer {
+    first_line: u32,
+    z_mm: f64,
+    time_s: f64,
     filament_mm: f64,
 }
 
@@ -61,7 +81,22 @@ impl From<&PlanReport> for Report {
             bytes_per_step: if steps == 0 { 0.0 } else { plan.bytes as f64 / steps as f64 },
             max_step_error_us: plan.step_error_max.0 * 1e6,
             filament_mm: plan.filament_mm,
+            features: plan.features.iter().map(|&(name, total)| Feature::new(name, total)).collect(),
+            layers: None,
         }
+    }
+}
+
+impl Feature {
+    const fn new(name: &'static str, total: Total) -> Self {
+        Self { name, time_s: total.time.0, filament_mm: total.filament.0 }
+    }
+}
+
+impl From<&LayerTotal> for Layer {
+    fn from(layer: &LayerTotal) -> Self {
+        let LayerTotal { first_line, z, total } = *layer;
+        Self { first_line, z_mm: z.0, time_s: total.time.0, filament_mm: total.filament.0 }
     }
 }
 
@@ -81,7 +116,9 @@ pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
             Profile::Jerk => Ramps::Jerk(args.max_jerk.map(MmPerS3)),
         }),
         step_error: args.step_error_us.map(|error_us| Seconds(error_us * 1e-6)),
+        trace: args.trace.is_some().then_some(Seconds(args.trace_step_ms * 1e-3)),
     };
+    let mut trace = TraceFile::create(args.trace.as_deref())?;
     let mut stream = PlanStream::with_options(&config, options)?;
     let mut blocks = Vec::new();
     loop {
@@ -89,17 +126,20 @@ pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
         if chunk.is_empty() {
             break;
         }
-        stream.feed(chunk, &mut blocks, |_| {})?;
+        stream.feed_to(chunk, &mut blocks, &mut trace)?;
+        trace.check()?;
         flush(&mut dump, &mut blocks)?;
         progress.set(input.position());
     }
-    let plan = stream.finish(&mut blocks, |_| {})?;
+    let plan = stream.finish_to(&mut blocks, &mut trace)?;
+    trace.finish()?;
     flush(&mut dump, &mut blocks)?;
     if let Some(dump) = dump {
         dump.finish()?;
     }
     drop(progress);
-    let report = Report::from(&plan);
+    let mut report = Report::from(&plan);
+    report.layers = args.layers.then(|| plan.layers.iter().map(Layer::from).collect());
     if args.json {
         console::print_json(&report)?;
     } else {
@@ -147,6 +187,10 @@ fn text(report: &Report) -> String {
     }
     let _ = writeln!(text, "Filament     {:.1} mm", report.filament_mm);
     let _ = writeln!(text, "Moves        {}", report.moves);
+    for Feature { name, time_s, filament_mm } in &report.features {
+        let time = console::duration_text(*time_s);
+        let _ = writeln!(text, "  {name:<18} {time:>14} {filament_mm:>12.1} mm");
+    }
     let _ = writeln!(text, "Motor              steps  queue_steps    peak steps/s");
     for name in MOTOR_NAMES {
         if let Some(motor) = report.motors.get(name) {
@@ -181,6 +225,7 @@ mod tests {
             "bytes_per_step",
             "max_step_error_us",
             "filament_mm",
+            "features",
         ];
         wanted.sort_unstable();
         assert_eq!(keys, wanted);

@@ -247,3 +247,98 @@ fn a_print_begins_with_a_line_or_a_layer() {
     let both = ["simulate", "a", "--config", "b", "--start-line", "3", "--start-layer", "2"];
     assert_eq!(stepcast(&both).status.code(), Some(2));
 }
+
+/// What `SAVE_CONFIG` leaves behind a machine file: a bed that is not flat, axes that are not square.
+const LEVEL: &str = "\n[skew_correction]\n[bed_mesh]\nfade_start: 0.5\nfade_end: 10\n\
+    #*# <---------------------- SAVE_CONFIG ---------------------->\n\
+    #*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.\n#*#\n\
+    #*# [bed_mesh default]\n#*# version = 1\n#*# points =\n\
+    #*# \t  0.110000, 0.042500, 0.012500, 0.120000\n#*# \t  0.052500, -0.035000, -0.067500, 0.060000\n\
+    #*# \t  0.030000, -0.062500, -0.102500, 0.030000\n#*# \t  0.150000, 0.065000, 0.020000, 0.160000\n\
+    #*# x_count = 4\n#*# y_count = 4\n#*# mesh_x_pps = 2\n#*# mesh_y_pps = 2\n#*# algo = bicubic\n\
+    #*# tension = 0.2\n#*# min_x = 20.0\n#*# max_x = 80.0\n#*# min_y = 20.0\n#*# max_y = 80.0\n#*#\n\
+    #*# [skew_correction calm]\n#*# xy_skew = 0.004\n#*# xz_skew = -0.002\n#*# yz_skew = 0.001\n";
+
+#[test]
+fn pulses_follow_a_bed_that_is_not_flat() {
+    let machine = fs::read_to_string(MACHINE).unwrap() + LEVEL;
+    let machine = File::new("level.cfg", machine);
+    let gcode = PRINT
+        .replacen("F9000\n", "F9000\nBED_MESH_PROFILE LOAD=default\nSKEW_PROFILE LOAD=calm\n", 1)
+        .replacen("G1 E1.6", "G1 Z3\nG1 X15 Y85 Z0.4 E3.6 F3000\nBED_MESH_CLEAR\nG1 E2.6", 1);
+    let file = File::new("level.gcode", &gcode);
+    let [path, machine] = [&file, &machine].map(|it| it.0.to_str().unwrap());
+    let output = stepcast(&["simulate", path, "--config", machine, "--json"]);
+    let report = json(&output);
+    assert_eq!(report["result"], "done", "{}", report["reason"]);
+    for motor in ["stepper_x", "stepper_y", "stepper_z", "extruder"] {
+        let motor = &report["motors"][motor];
+        assert_eq!(motor["planned_steps"], motor["counted_steps"]);
+        assert_eq!(motor["lost_steps"], 0);
+    }
+    // A microstep across and up, and what a piece may be off.
+    assert!(report["path_error_max_mm"].as_f64().unwrap() <= 0.02, "{}", report["path_error_max_mm"]);
+    let (_, flat) = simulate(
+        &File::new(
+            "flat.gcode",
+            gcode.replace("BED_MESH_PROFILE LOAD=default\n", "").replace("SKEW_PROFILE LOAD=calm\n", ""),
+        ),
+        &[],
+    );
+    let steps = |report: &Value| report["motors"]["stepper_z"]["counted_steps"].as_u64().unwrap();
+    assert!(steps(&report) > steps(&flat) + 20, "Z follows the bed: {} {}", steps(&report), steps(&flat));
+    assert!(report["moves"].as_u64() > flat["moves"].as_u64());
+    // What is not there is said before anything moves.
+    let wrong = File::new("no-mesh.gcode", gcode.replace("LOAD=default", "LOAD=warm"));
+    let output = stepcast(&["simulate", wrong.0.to_str().unwrap(), "--config", machine, "--json"]);
+    let report = json(&output);
+    assert_eq!((&report["result"], &report["error"]["code"]), (&"refused".into(), &"no-such-profile".into()));
+}
+
+#[test]
+fn a_plan_tells_features_layers_and_the_axes_over_time() {
+    let file = File::new("trace.gcode", format!(";TYPE:External perimeter\n{PRINT}"));
+    let table = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("trace.csv");
+    let [path, csv] = [&file.0, &table].map(|path| path.to_str().expect("a path in UTF-8"));
+    let plan = ["plan", path, "--config", MACHINE, "--json", "--layers", "--trace", csv];
+    let report = json(&stepcast(&[&plan[..], &["--trace-step-ms", "2"]].concat()));
+    let sum = |list: &str| -> f64 {
+        let list = report[list].as_array().expect("a list");
+        list.iter().map(|one| one["time_s"].as_f64().expect("a time")).sum()
+    };
+    let time = report["print_time_s"].as_f64().expect("a time");
+    assert!((sum("features") - time).abs() < 1e-6 && (sum("layers") - time).abs() < 1e-6, "{report:#}");
+    let names: Vec<_> = report["features"].as_array().unwrap().iter().map(|one| &one["name"]).collect();
+    assert_eq!(names, ["outer_wall", "travel", "retraction"]);
+    let text = fs::read_to_string(&table).expect("the table");
+    let rows: Vec<Vec<f64>> =
+        text.lines().skip(1).map(|row| row.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
+    assert!(text.starts_with("time_s,x_mm,y_mm,z_mm,e_mm,x_mm_s,"));
+    assert!((rows.len() as f64 - time / 0.002).abs() <= 1.0 && rows.iter().all(|row| row.len() == 13));
+    // From place to place at the speeds between, but for what accelerations do in 2 ms.
+    for pair in rows.windows(2) {
+        for axis in 1..5 {
+            let (way, mean) = (pair[1][axis] - pair[0][axis], 0.5 * (pair[0][axis + 4] + pair[1][axis + 4]));
+            assert!((way - 0.002 * mean).abs() < 0.02, "{pair:?}");
+        }
+    }
+    let unwritable = stepcast(&["plan", path, "--config", MACHINE, "--trace", "/nowhere/trace.csv"]);
+    assert_eq!(unwritable.status.code(), Some(1));
+    assert!(stderr(&unwritable).contains("/nowhere/trace.csv"));
+}
+
+#[test]
+fn arcs_are_drawn_as_arcs() {
+    let arcs = "M83\nG3 X50 Y50 I10 J0 E2 F9000\nG2 X70 Y50 R10 E1\nG1 X75 E0.1\nG3 X80 Y55 I0 J5 E0.3\nG1 Y70\nG18\n\
+        G3 X90 Z0.3 I5 K0 F600\nG17\nG3 X90 Y70 Z5 I-4 J0 P4 E0.5 F3000\nG2 X90.3 Y70 I0.15 J0 E0.05\nG91\nG2 X1 Y1 I1\n\
+        G90\nM82\nG92 E2\n";
+    let print = PRINT.replacen("G3 X60 Y60 I10 J0 E2.6\n", arcs, 1);
+    let (output, report) = simulate(&File::new("arcs.gcode", print), &[]);
+    assert!(output.status.success(), "{report:#}");
+    // Half a step of two axes, and what a step's time may be off.
+    assert!(report["path_error_max_mm"].as_f64().is_some_and(|error| error < 0.013), "{report:#}");
+    for motor in ["stepper_x", "stepper_y", "stepper_z", "extruder"] {
+        let steps = &report["motors"][motor];
+        assert_eq!(steps["planned_steps"], steps["counted_steps"], "{motor}");
+    }
+}

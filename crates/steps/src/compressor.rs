@@ -4,17 +4,24 @@
 //! nearer to each other than half their true gap. Every clock is integer arithmetic from the clock before, and every
 //! window lies around the true time: errors never add up.
 //!
+//! Windows are tried at growing distances, and where one cannot be passed any more, those before it; what is given out passes
+//! the windows of all its steps. So most steps cost no more than their time and their window.
+//!
 //! Whether a command is closed depends on the step times alone, never on when they become known: a later step either
 //! closes it by its distance or could have gone on with it. Only where another motor's pieces run out of room is one
 //! closed early, after a number of moves that is always the same.
 
-use crate::stabbing::{FIT_STEPS_MAX, Stabbing, larger, smaller};
+use crate::crossing::Piece;
+use crate::stabbing::{FIT_STEPS_MAX, Fit, Stabbing, larger, smaller};
+use crate::windows::{Gaps, Steps, append_errors, shortest_gap};
 use crate::{IDLE_TICKS_MAX, StepCommand, StepCommandKind};
 use std::collections::VecDeque;
 use units::{Seconds, Ticks};
 
+/// Steps of one motor that are taken at a time.
+pub(crate) const TURN_STEPS: u32 = 128;
 /// The most steps of one motor that wait for their command to be closed.
-pub const STEPS_BUFFERED_MAX: usize = FIT_STEPS_MAX as usize + 2;
+pub const STEPS_BUFFERED_MAX: usize = (FIT_STEPS_MAX + TURN_STEPS) as usize + 2;
 /// A step is given out once the plan is known this far beyond it.
 pub const STEP_HOLD_MAX: Seconds = Seconds(0.1);
 /// The longest time from the first to the last step of a command.
@@ -26,6 +33,10 @@ const GAP_MIN: Seconds = Seconds(0.5e-6);
 const GAP_MIN_TICKS: f64 = 4.0;
 /// The share of the gap to a neighbour by which a step may be off.
 const GAP_SHARE: f64 = 0.25;
+/// After `n` steps that a command passes, the window `2 + n / STRIDE` further on is tried.
+const STRIDE: u32 = 8;
+/// Times of steps that are given out stay in the buffer up to this many.
+const GONE_MAX: usize = 1024;
 
 /// Step times of one motor, and the commands made of them.
 #[derive(Clone, Debug)]
@@ -41,8 +52,12 @@ pub(crate) struct Compressor {
     base_ticks: f64,
     /// True time of that step.
     base_time: f64,
-    /// True times of the steps since, one way; the last one's window is not known yet.
+    /// True times of the steps since, one way; before `first`, of some that are given out.
     times: Vec<f64>,
+    /// What each of them may be off; that of the last is not known yet.
+    errors: Vec<f64>,
+    /// The first of them that is not given out.
+    first: usize,
     /// How far the last step is from the one before it.
     gap_before: f64,
     forward: bool,
@@ -83,6 +98,8 @@ impl Compressor {
             base_ticks: 0.0,
             base_time: f64::NEG_INFINITY,
             times: Vec::new(),
+            errors: Vec::new(),
+            first: 0,
             gap_before: 0.0,
             forward: true,
             told: None,
@@ -103,7 +120,7 @@ impl Compressor {
         self.base = 0;
         self.base_ticks = 0.0;
         self.base_time = f64::NEG_INFINITY;
-        self.times.clear();
+        self.forget();
         self.told = None;
         self.stabbing.clear();
         self.out.clear();
@@ -121,13 +138,76 @@ impl Compressor {
     /// True time of the first step that has not been taken, ticks.
     pub(crate) fn first_time(&self) -> Option<f64> {
         let ready = self.out.front().map(|&(time, _)| time);
-        ready.or(self.times.first().copied())
+        ready.or_else(|| self.times.get(self.first).copied())
+    }
+
+    /// Steps that wait.
+    fn waiting(&self) -> usize {
+        self.times.len() - self.first
+    }
+
+    /// No step waits.
+    fn forget(&mut self) {
+        self.times.clear();
+        self.errors.clear();
+        self.first = 0;
+    }
+
+    /// Takes some of the next steps of `piece`, whose times never fall; returns the last one's, ticks.
+    pub(crate) fn take_from(&mut self, piece: &mut Piece) -> f64 {
+        let forward = piece.forward;
+        let mut fresh = self.times.len();
+        piece.append_times(piece.steps.min(u64::from(TURN_STEPS)) as u32, &mut self.times);
+        let Some(&last) = self.times.last() else { return 0.0 };
+        if fresh == self.first || forward != self.forward {
+            // What begins or turns is taken by itself.
+            let rest = self.times.split_off(fresh);
+            let mut rest = rest.iter();
+            while let Some(&time) =
+                rest.as_slice().first().filter(|_| self.waiting() == 0 || forward != self.forward)
+            {
+                self.step(time, forward);
+                rest.next();
+            }
+            fresh = self.times.len();
+            self.times.extend(rest);
+        }
+        if fresh < self.times.len() && !self.take_run(fresh) {
+            for time in self.times.split_off(fresh) {
+                self.step(time, forward);
+            }
+        }
+        last
+    }
+
+    /// Takes all steps from index `fresh` on, which go on from the one before in every way; `false` where any of them asks
+    /// for more than that.
+    fn take_run(&mut self, fresh: usize) -> bool {
+        let times = &self.times[fresh - 1..];
+        let known = self.errors.len();
+        self.errors.push(self.error(self.gap_before, times[1] - times[0]));
+        let limits = Gaps { shortest: self.gap_min, longest: self.hold_max, record: self.tally.gap_min };
+        let (is_usual, is_shorter) =
+            append_errors(times, self.max_error, GAP_SHARE, &limits, &mut self.errors);
+        let span = times[times.len() - 1] - self.times[self.first];
+        if !(is_usual && span <= self.span_max) {
+            self.errors.truncate(known);
+            return false;
+        }
+        if is_shorter {
+            self.tally.gap_min = shortest_gap(times);
+        }
+        self.gap_before = times[times.len() - 1] - times[times.len() - 2];
+        self.fit_in();
+        true
     }
 
     /// A step at `time` (ticks). Times never fall.
-    #[inline]
-    pub(crate) fn step(&mut self, time: f64, forward: bool) {
-        let Some(&last) = self.times.last() else { return self.first_step(time, forward) };
+    fn step(&mut self, time: f64, forward: bool) {
+        if self.waiting() == 0 {
+            return self.first_step(time, forward);
+        }
+        let last = self.times[self.times.len() - 1];
         let gap = time - last;
         if forward != self.forward {
             return self.step_back(time, gap);
@@ -135,17 +215,13 @@ impl Compressor {
         let gap = larger(gap, self.gap_min);
         self.tally.gap_min = smaller(self.tally.gap_min, gap);
         let time = last + gap;
-        // The usual case of `take_last`.
-        let error = self.error(self.gap_before, gap);
-        let ticks = last - self.base_ticks;
-        if self.stabbing.count() == 0 || !self.stabbing.take(ticks - error, ticks + error) {
-            self.take_last(time);
-        }
+        self.errors.push(self.error(self.gap_before, gap));
         self.gap_before = gap;
+        self.fit_in();
         // None is left where the last one came after a long rest.
-        let first = self.times.first().copied().unwrap_or(time);
+        let first = self.times.get(self.first).copied().unwrap_or(time);
         if gap > self.hold_max || time - first > self.span_max {
-            self.emit_all(time);
+            self.emit_all();
         }
         self.times.push(time);
     }
@@ -156,6 +232,7 @@ impl Compressor {
         let time = larger(time, larger(self.base_ticks, self.base_time) + self.gap_min);
         self.forward = forward;
         self.gap_before = time - self.base_time;
+        self.forget();
         self.times.push(time);
     }
 
@@ -164,25 +241,31 @@ impl Compressor {
         if gap < self.gap_min {
             return self.take_back();
         }
-        self.emit_all(time);
+        self.errors.push(self.error(self.gap_before, gap));
+        self.emit_all();
         self.forward = !self.forward;
         self.gap_before = gap;
         self.times.push(time);
     }
 
-    /// The last step never was. The one before it has been fitted in already, and must wait for its neighbour again.
+    /// The last step never was. The one before it waits for its neighbour again.
     fn take_back(&mut self) {
         self.times.pop();
-        let Some(last) = self.times.pop() else { return };
+        if self.waiting() == 0 {
+            return self.forget();
+        }
+        self.errors.pop();
         self.stabbing.clear();
-        self.take_last(last);
-        self.gap_before = last - self.times.last().copied().unwrap_or(self.base_time);
-        self.times.push(last);
+        self.fit_in();
+        let before = self.times[self.first..].iter().rev().nth(1).copied();
+        if let Some(last) = self.times[self.first..].last() {
+            self.gap_before = last - before.unwrap_or(self.base_time);
+        }
     }
 
     /// Nothing comes before `time`: gives out what could not go on beyond it.
     pub(crate) fn idle_until(&mut self, time: f64) {
-        if self.times.last().is_some_and(|last| time - last > self.hold_max) {
+        if self.waiting() > 0 && time - self.times[self.times.len() - 1] > self.hold_max {
             self.end();
         }
     }
@@ -190,47 +273,33 @@ impl Compressor {
     /// Gives out what could still have gone on: others wait for it, and their room is used up. What follows the last
     /// step comes no earlier than `next`.
     pub(crate) fn close_early(&mut self, next: f64) {
-        if self.times.len() <= 1 {
-            return self.emit_all(next);
-        }
-        self.take_all_but(1, next);
-        if self.out.is_empty() {
-            self.emit();
+        match self.waiting() {
+            0 => {}
+            1 => {
+                self.close_last(next);
+                self.emit_all();
+            }
+            _ => {
+                self.fit_in();
+                if self.out.is_empty() && self.fit_rest() {
+                    self.emit();
+                }
+            }
         }
     }
 
     /// No more steps in this run, or none for a long time.
     pub(crate) fn end(&mut self) {
-        self.emit_all(f64::INFINITY);
-    }
-
-    /// Fits the last step in, now that its neighbour at `next` is known, and any that a closed command left.
-    #[inline(never)]
-    fn take_last(&mut self, next: f64) {
-        self.take_all_but(0, next);
-    }
-
-    /// Fits in all steps but the last `open` ones; whatever follows the last of all comes at `next`.
-    fn take_all_but(&mut self, open: usize, next: f64) {
-        while (self.stabbing.count() as usize) + open < self.times.len() {
-            let index = self.stabbing.count() as usize;
-            let (earliest, latest) = self.window(index, next);
-            if index == 0 && latest > IDLE_TICKS_MAX as f64 {
-                self.emit_after_rest();
-            } else if !self.stabbing.take(earliest, latest) {
-                self.emit();
-            }
+        if self.waiting() > 0 {
+            self.close_last(f64::INFINITY);
+            self.emit_all();
         }
     }
 
-    /// When step `index` may come, in ticks after the last step given out.
-    fn window(&self, index: usize, next: f64) -> (f64, f64) {
-        let time = self.times[index];
-        let before = if index == 0 { self.base_time } else { self.times[index - 1] };
-        let after = self.times.get(index + 1).copied().unwrap_or(next);
-        let error = self.error(time - before, after - time);
-        let ticks = time - self.base_ticks;
-        (larger(ticks - error, 1.0), ticks + error)
+    /// The last step's window, where the next step comes no earlier than `next`.
+    fn close_last(&mut self, next: f64) {
+        let last = self.times[self.times.len() - 1];
+        self.errors.push(self.error(self.gap_before, next - last));
     }
 
     /// How early or late a step may come between two gaps.
@@ -239,39 +308,115 @@ impl Compressor {
         smaller(self.max_error, GAP_SHARE * smaller(gap_before, gap_after))
     }
 
-    /// Gives out all steps; whatever follows them comes at `next`.
-    fn emit_all(&mut self, next: f64) {
+    /// The steps that wait and whose windows are known.
+    fn known(&self) -> u32 {
+        (self.errors.len() - self.first) as u32
+    }
+
+    /// Tries the window of waiting step number `count`, from 1.
+    fn take(&mut self, count: u32) -> bool {
+        let index = self.first + count as usize - 1;
+        let (ticks, error) = (self.times[index] - self.base_ticks, self.errors[index]);
+        self.stabbing.take(count, larger(ticks - error, 1.0), ticks + error)
+    }
+
+    /// Tries windows at growing distances as far as they are known, and closes commands that cannot go on.
+    fn fit_in(&mut self) {
         loop {
-            self.take_last(next);
-            if self.times.is_empty() {
-                break;
+            let passed = self.stabbing.count();
+            let next = FIT_STEPS_MAX.min(passed + if passed == 0 { 1 } else { 2 + passed / STRIDE });
+            if next > self.known() {
+                return;
+            }
+            if passed == 0 && self.is_after_rest() {
+                self.emit_after_rest();
+            } else if next == passed || !self.take(next) {
+                self.refine(next);
+                self.emit();
+            }
+        }
+    }
+
+    /// Tries the last window of those that are known; whether any is.
+    fn fit_rest(&mut self) -> bool {
+        let known = self.known();
+        if known == 0 {
+            return false;
+        }
+        if self.stabbing.count() < known && !self.take(known) {
+            self.refine(known);
+        }
+        true
+    }
+
+    /// The window of step number `failed` cannot be passed: finds the last before it that can.
+    fn refine(&mut self, mut failed: u32) {
+        while failed > self.stabbing.count() + 1 {
+            let middle = self.stabbing.count().midpoint(failed);
+            if !self.take(middle) {
+                failed = middle;
+            }
+        }
+    }
+
+    /// Gives out all steps; the window of the last is known.
+    fn emit_all(&mut self) {
+        loop {
+            self.fit_in();
+            if !self.fit_rest() {
+                return self.forget();
             }
             self.emit();
         }
     }
 
-    /// Closes one command with the steps taken so far, or with the first of them.
+    /// Closes one command with the steps passed so far, or with the first of them.
     fn emit(&mut self) {
-        let last = self.times[self.stabbing.count() as usize - 1];
-        let fit = self.stabbing.fit(last - self.base_ticks);
-        // Floats hold these integers exactly, and need no conversion to be compared.
-        let mut clock = self.base_ticks;
-        let mut interval = f64::from(fit.interval);
-        let add = f64::from(fit.add);
-        let mut error = 0.0;
-        for &time in &self.times[..fit.count as usize] {
-            clock += interval;
-            interval += add;
-            error = larger(error, (clock - time).abs());
-        }
+        let mut record = self.tally.error_max;
+        let fit = self.fit(&mut record).unwrap_or_else(|| self.fit_closely(&mut record));
+        let (interval, add, count) = (f64::from(fit.interval), f64::from(fit.add), f64::from(fit.count));
+        // Floats hold these integers exactly.
+        let clock = self.base_ticks + count * (interval + 0.5 * add * (count - 1.0));
         let kind =
             StepCommandKind::QueueStep { interval: fit.interval, count: fit.count as u16, add: fit.add };
-        self.put(kind, clock as u64, fit.count as usize, error);
+        self.put(kind, clock as u64, fit.count as usize, record);
+    }
+
+    /// The steps that wait and whose windows are known.
+    fn steps(&self) -> Steps<'_> {
+        Steps {
+            base: self.base_ticks,
+            times: &self.times[self.first..self.errors.len()],
+            errors: &self.errors[self.first..],
+        }
+    }
+
+    /// A command for all steps passed so far.
+    fn fit(&self, record: &mut f64) -> Option<Fit> {
+        let last = self.times[self.first + self.stabbing.count() as usize - 1];
+        self.stabbing.fit(&self.steps(), last - self.base_ticks, record)
+    }
+
+    /// A window between those that were tried is in the way: tries them all.
+    fn fit_closely(&mut self, record: &mut f64) -> Fit {
+        let passed = self.stabbing.count();
+        self.stabbing.clear();
+        for count in 1..=passed {
+            if !self.take(count) {
+                break;
+            }
+        }
+        self.fit(record).unwrap_or_else(|| self.stabbing.fit_some(&self.steps(), record))
+    }
+
+    /// Whether the board's 32-bit clock cannot express how far the next step is.
+    fn is_after_rest(&self) -> bool {
+        self.times[self.first] + self.errors[self.first] - self.base_ticks > IDLE_TICKS_MAX as f64
     }
 
     /// A single step after a rest that the board's 32-bit clock cannot express: the distance wraps.
     fn emit_after_rest(&mut self) {
-        let time = self.times[0];
+        let time = self.times[self.first];
         let mut clock = (time + 0.5) as u64;
         if (clock - self.base) as u32 == 0 {
             clock += 1;
@@ -283,7 +428,7 @@ impl Compressor {
 
     fn put(&mut self, kind: StepCommandKind, end: u64, steps: usize, error: f64) {
         let start = Ticks(self.base);
-        let first_time = self.times[0];
+        let first_time = self.times[self.first];
         if self.told != Some(self.forward) {
             self.told = Some(self.forward);
             self.tally.direction_changes += 1;
@@ -296,8 +441,13 @@ impl Compressor {
         self.tally.error_max = self.tally.error_max.max(error);
         self.base = end;
         self.base_ticks = end as f64;
-        self.base_time = self.times[steps - 1];
-        self.times.drain(..steps);
+        self.first += steps;
+        self.base_time = self.times[self.first - 1];
+        if self.first > GONE_MAX {
+            self.times.drain(..self.first);
+            self.errors.drain(..self.first);
+            self.first = 0;
+        }
         self.stabbing.clear();
     }
 }

@@ -5,6 +5,7 @@ use crate::Segment;
 use crate::polynomial::sign_changes;
 use crate::segment::DEGREE_MAX;
 use crate::stabbing::{larger, smaller};
+use crate::windows::append_each;
 
 /// How near (ticks) two approximations of a step's time are when the last one counts: its own error is the square of it
 /// in shares of the piece, far below.
@@ -35,8 +36,10 @@ enum Curve {
 /// Position grows from the start of the piece.
 #[derive(Clone, Copy, Debug)]
 struct Quadratic {
-    /// Way from the start of the piece to the next crossing, in steps.
+    /// Way from the start of the piece to its first crossing, in steps.
     way: f64,
+    /// Crossings passed.
+    passed: f64,
     /// Speed at its start, steps a tick, not negative.
     velocity: f64,
     /// Speed squared.
@@ -106,6 +109,10 @@ impl Grid {
         let [c1, c2, c3, c4, c5] = segment.powers;
         let peak = if segment.is_quadratic() {
             c1.abs().max((c1 + 2.0 * c2 * t).abs())
+        } else if c4 == 0.0 && c5 == 0.0 {
+            let turn = -c2 / (3.0 * c3);
+            let within = if turn > 0.0 && turn < t { (c1 + c2 * turn).abs() } else { 0.0 };
+            c1.abs().max((c1 + (2.0 * c2 + 3.0 * c3 * t) * t).abs()).max(within)
         } else {
             let rest = [2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5];
             c1.abs() + rest.iter().rev().fold(0.0, |sum, power| (sum + power.abs()) * t)
@@ -173,6 +180,7 @@ fn quadratic(
         let velocity = (sign * velocity).max(0.0);
         Curve::Quadratic(Quadratic {
             way: (sign * (edge - stretch.from)).max(0.0),
+            passed: 0.0,
             velocity,
             velocity2: velocity * velocity,
             accel_twice: 4.0 * sign * half_accel,
@@ -198,25 +206,29 @@ impl Piece {
         self.steps as f64 > rate * duration + 2.0
     }
 
-    /// Run clock of the next crossing, in ticks; moves on to the one after.
-    #[inline]
-    pub(crate) fn next_time(&mut self) -> f64 {
-        self.steps -= 1;
+    /// Appends the run clocks (ticks) of the next `count` crossings; moves on to the one after.
+    pub(crate) fn append_times(&mut self, count: u32, out: &mut Vec<f64>) {
+        self.steps -= u64::from(count);
+        let (start, duration) = (self.start, self.duration);
         match &mut self.curve {
-            Curve::Quadratic(quadratic) => self.start + quadratic.next(self.duration),
-            Curve::Higher(higher) => self.start + higher.next(self.duration) * self.duration,
+            Curve::Quadratic(quadratic) => {
+                let curve = *quadratic;
+                append_each(count, move |index| start + curve.time(index, duration), out);
+                quadratic.passed += f64::from(count);
+            }
+            Curve::Higher(higher) => out.extend((0..count).map(|_| start + higher.next(duration) * duration)),
         }
     }
 }
 
 impl Quadratic {
-    /// Ticks from the start of the piece.
+    /// When the crossing `index` after the next is passed, in ticks from the start of the piece.
     #[inline]
-    fn next(&mut self, duration: f64) -> f64 {
+    fn time(&self, index: f64, duration: f64) -> f64 {
+        let way = self.way + (self.passed + index);
         // The root of velocity·τ + half_accel·τ² = way that stays exact where either vanishes.
-        let root = larger(self.velocity2 + self.accel_twice * self.way, 0.0).sqrt();
-        let time = 2.0 * self.way / larger(self.velocity + root, f64::MIN_POSITIVE);
-        self.way += 1.0;
+        let root = larger(self.velocity2 + self.accel_twice * way, 0.0).sqrt();
+        let time = 2.0 * way / larger(self.velocity + root, f64::MIN_POSITIVE);
         // Rounding must not carry a step beyond the piece that it was counted in.
         smaller(time, duration)
     }

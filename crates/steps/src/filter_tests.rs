@@ -13,7 +13,7 @@ use units::{Mm, MmPerS, Seconds, StepCount};
 const SMOOTH: Seconds = Seconds(0.04);
 const EXTRUDER: usize = 3;
 
-fn plan(from: [f64; 4], points: &[([f64; 4], f64)], lead: Seconds) -> Vec<PlannedMove> {
+pub(crate) fn plan(from: [f64; 4], points: &[([f64; 4], f64)], lead: Seconds) -> Vec<PlannedMove> {
     let mut look_ahead = LookAhead::new(limits()).unwrap();
     look_ahead.dwell(lead);
     let mut at = from;
@@ -25,7 +25,11 @@ fn plan(from: [f64; 4], points: &[([f64; 4], f64)], lead: Seconds) -> Vec<Planne
     std::iter::from_fn(|| look_ahead.pop()).collect()
 }
 
-fn generator<K: Kinematics>(kinematics: K, filters: &Filters, advance: &Advance) -> StepGenerator<K> {
+pub(crate) fn generator<K: Kinematics>(
+    kinematics: K,
+    filters: &Filters,
+    advance: &Advance,
+) -> StepGenerator<K> {
     let specs = STEP_DISTANCES.map(|distance| StepperSpec::new(Mm(distance)));
     let mut generator = StepGenerator::new(CLOCK, &specs, kinematics).unwrap();
     generator.set_filters(filters);
@@ -33,7 +37,7 @@ fn generator<K: Kinematics>(kinematics: K, filters: &Filters, advance: &Advance)
     generator
 }
 
-fn commands<K: Kinematics>(
+pub(crate) fn commands<K: Kinematics>(
     generator: &mut StepGenerator<K>,
     planned: &[PlannedMove],
     eager: bool,
@@ -52,7 +56,7 @@ fn commands<K: Kinematics>(
 }
 
 /// Position and speed of an axis along a plan.
-fn state(planned: &[PlannedMove], axis: usize, time: f64) -> (f64, f64, bool) {
+pub(crate) fn state(planned: &[PlannedMove], axis: usize, time: f64) -> (f64, f64, bool) {
     let index = planned.partition_point(|one| one.end_time() <= time);
     let Some(one) = planned.get(index) else {
         return (planned.last().map_or(0.0, |last| last.to[axis]), 0.0, false);
@@ -328,7 +332,7 @@ impl Kinematics for Crossed {
     }
 }
 
-fn all_filters() -> Filters {
+pub(crate) fn all_filters() -> Filters {
     let shaper = |kind, frequency| Shaper::new(kind, frequency, 0.1);
     Filters {
         shapers: [shaper(ShaperKind::Mzv, 52.0), shaper(ShaperKind::TwoHumpEi, 41.0), None],
@@ -373,7 +377,7 @@ proptest! {
         for [x, y, length, start_time, accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, accel] in raw {
             let planned = PlannedMove {
                 tag: 0, from: at, to: [x, y, at[2], at[3] + 1.0], direction: [0.6, 0.8, 0.0, 0.1], length, start_time,
-                accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, end_velocity: 0.0, accel, shape: None,
+                accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, end_velocity: 0.0, accel, shape: None, bend: None,
             };
             if generator.push(&planned).is_ok() {
                 at = planned.to;

@@ -1,6 +1,7 @@
 //! Planned moves in, commands for all motors out, in the order of time.
 
 use crate::advance::Lines;
+use crate::bent::{bent_segments, turning_axis};
 use crate::compressor::{Compressor, gap_min_ticks};
 use crate::crossing::{Grid, Piece, nearest_step};
 use crate::filter::Filter;
@@ -15,8 +16,6 @@ use units::{Hertz, Seconds, StepCount, Ticks};
 
 /// The most stretches of one motor's path that wait to be turned into steps.
 pub const PIECES_MAX: usize = 4096;
-/// Steps of one motor that are generated before the others get their turn.
-const TURN_STEPS: u64 = 256;
 /// The axis that pressure advance is for.
 const EXTRUDER: usize = 3;
 /// Positions are below this many steps: beyond it a float's half steps blur.
@@ -174,6 +173,13 @@ impl<K: Kinematics> StepGenerator<K> {
         self.axes.iter().filter_map(|axis| axis.filter.as_ref())
     }
 
+    /// What the last [`Self::push`] or [`Self::end_run`] has made known of each axis' path, after pressure advance and shaping,
+    /// and the print time up to which all of them are known.
+    pub fn axis_paths(&self) -> (&[Vec<Segment>; AXES], Seconds) {
+        let known = self.axes.iter().map(|axis| axis.known).fold(f64::INFINITY, f64::min);
+        (&self.paths, Seconds(known))
+    }
+
     /// Segments that the filters hold: the most of any, see [`crate::SEGMENTS_HELD_MAX`].
     pub fn segments_held(&self) -> usize {
         self.filters().map(Filter::held).max().unwrap_or(0)
@@ -266,24 +272,32 @@ impl<K: Kinematics> StepGenerator<K> {
 
     /// What becomes known of each axis with a move.
     fn push_to_axes(&mut self, planned: &PlannedMove) {
-        let draws = planned.direction[0] != 0.0 || planned.direction[1] != 0.0;
+        let draws = planned.bend.is_some() || planned.direction[0] != 0.0 || planned.direction[1] != 0.0;
         for (index, (axis, path)) in self.axes.iter_mut().zip(&mut self.paths).enumerate() {
             path.clear();
             let (from, to) = (planned.from[index], planned.to[index]);
+            let turning = turning_axis(planned, index);
+            // An arc's direction in space is that of its chord.
+            let ratio =
+                if planned.bend.is_some() { (to - from) / planned.length } else { planned.direction[index] };
             let Some(filter) = &mut axis.filter else {
                 axis.known = planned.end_time();
-                if from != to {
-                    segments(planned, from, to, planned.direction[index], &mut |segment| path.push(segment));
+                if let Some(turning) = turning {
+                    bent_segments(planned, turning, [from, to], &mut |segment| path.push(segment));
+                } else if from != to {
+                    segments(planned, from, to, ratio, &mut |segment| path.push(segment));
                 }
                 continue;
             };
             let input = filter.path();
             input.rest_until(planned.start_time);
-            if from == to {
+            if let Some(turning) = turning {
+                bent_segments(planned, turning, [from, to], &mut |segment| input.push(segment));
+            } else if from == to {
                 input.rest_at(planned.end_time(), to);
             } else {
                 let has_advance = index == EXTRUDER && draws && to > from;
-                segments(planned, from, to, planned.direction[index], &mut |segment| {
+                segments(planned, from, to, ratio, &mut |segment| {
                     if has_advance {
                         self.advance.apply(&segment, &mut |segment| input.push(segment));
                     } else {
@@ -366,17 +380,33 @@ impl<K: Kinematics> StepGenerator<K> {
     /// or the run is ended.
     pub fn pop(&mut self) -> Option<StepCommand> {
         loop {
-            let is_full = self.is_full();
-            let order = |a: &&mut Motor, b: &&mut Motor| a.earliest().total_cmp(&b.earliest());
-            let first = self.motors.iter_mut().min_by(order)?;
-            if first.compressor.is_ready() {
-                return first.compressor.pop();
+            // The motor whose next step is first, and when another may be.
+            let (mut index, mut earliest, mut others) = (0, f64::INFINITY, f64::INFINITY);
+            for (motor, at) in self.motors.iter().map(Motor::earliest).enumerate() {
+                if at < earliest {
+                    (index, earliest, others) = (motor, at, earliest);
+                } else if at < others {
+                    others = at;
+                }
             }
-            if !first.advance(self.ended) {
-                if !is_full {
+            let first = self.motors.get_mut(index)?;
+            let is_stuck = loop {
+                if first.compressor.is_ready() {
+                    return first.compressor.pop();
+                }
+                if !first.advance(self.ended) {
+                    break true;
+                }
+                if first.earliest() >= others {
+                    break false;
+                }
+            };
+            if is_stuck {
+                if !self.is_full() {
                     return None;
                 }
                 // Its open command holds up a motor whose pieces have no room left.
+                let first = &mut self.motors[index];
                 first.compressor.close_early(first.known);
                 if !first.compressor.is_ready() {
                     return None;
@@ -432,12 +462,7 @@ impl Motor {
             }
             return self.generated > before || self.compressor.is_ready();
         };
-        let forward = piece.forward;
-        for _ in 0..TURN_STEPS.min(piece.steps) {
-            let time = piece.next_time();
-            self.compressor.step(time, forward);
-            self.generated = time;
-        }
+        self.generated = self.compressor.take_from(piece);
         if piece.steps == 0 {
             self.pieces.pop_front();
         }

@@ -15,6 +15,7 @@
 //! straight lines between data ranges", 1981).
 
 mod advance;
+mod bent;
 mod compressor;
 mod crossing;
 mod delayed_sum;
@@ -27,12 +28,13 @@ mod segment;
 mod shaper;
 mod spec;
 mod stabbing;
+mod windows;
 
 pub use advance::{Advance, Nonlinear};
 pub use compressor::{RUN_SPAN_MAX, STEP_HOLD_MAX, STEPS_BUFFERED_MAX};
 pub use delayed_sum::SEGMENTS_HELD_MAX;
 pub use generator::{Filters, PIECES_MAX, SMOOTH_TIME_MAX, StepGenerator};
-pub use kinematics::{AXES, Cartesian, Kinematics};
+pub use kinematics::{AXES, Cartesian, Delta, Geometry, Kinematics, Linear, STRETCH_RATIO_MAX, Tower};
 pub use segment::{DEGREE_MAX, Segment};
 pub use shaper::{DAMPING_RATIOS, SHAPER_FREQUENCIES, Shaper, ShaperKind};
 pub use spec::{MotorStats, PushError, SpecError, StepperSpec};
@@ -84,6 +86,8 @@ pub fn step_rate_max(clock: Hertz) -> f64 {
     ticks_per_s / compressor::gap_min_ticks(ticks_per_s)
 }
 
+#[cfg(test)]
+mod bent_tests;
 #[cfg(test)]
 mod filter_tests;
 #[cfg(test)]

@@ -41,6 +41,8 @@ impl Merge {
             self.queues[axis].extend(&paths[axis]);
         }
         loop {
+            // Also what is so short that the clock does not tell its end from its start.
+            self.pop_done();
             let seams = (0..AXES).filter(|&axis| self.axes[axis]).map(|axis| self.seam(axis, known[axis]));
             let end = seams.fold(f64::INFINITY, f64::min);
             if !(end > self.time && end < f64::INFINITY) {
@@ -51,10 +53,14 @@ impl Merge {
                 out(&stretch);
             }
             self.time = end;
-            for (queue, position) in self.queues.iter_mut().zip(&mut self.positions) {
-                while let Some(done) = queue.pop_front_if(|front| front.end_time() <= end) {
-                    *position = done.end;
-                }
+        }
+    }
+
+    /// Forgets what has come to its end.
+    fn pop_done(&mut self) {
+        for (queue, position) in self.queues.iter_mut().zip(&mut self.positions) {
+            while let Some(done) = queue.pop_front_if(|front| front.end_time() <= self.time) {
+                *position = done.end;
             }
         }
     }
@@ -78,5 +84,39 @@ impl Merge {
         let mut part = front.part(self.time - front.start_time, to);
         part.start_time = self.time;
         part
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_takes_no_time_holds_nothing_up() {
+        let mut merge = Merge::new([true, true, false, false]);
+        merge.begin([0.0; AXES]);
+        // So short that adding it to its start changes nothing.
+        let dust = |start_time: f64, start: f64| Segment {
+            start_time,
+            duration: 1e-18,
+            start,
+            end: start + 1e-15,
+            powers: [1e3, 0.0, 0.0, 0.0, 0.0],
+        };
+        let way = |start_time: f64, start: f64| Segment {
+            start_time,
+            duration: 1.0,
+            start,
+            end: start + 1.0,
+            powers: [1.0, 0.0, 0.0, 0.0, 0.0],
+        };
+        let mut stretches = 0;
+        for second in 0..10 {
+            let at = 30.0 + f64::from(second);
+            let paths = [vec![dust(at, at), way(at, at)], vec![], vec![], vec![]];
+            merge.take(&paths, &[at + 1.0; AXES], |_| stretches += 1);
+            assert_eq!(merge.time(), at + 1.0);
+        }
+        assert_eq!(stretches, 10);
     }
 }

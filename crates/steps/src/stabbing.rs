@@ -1,10 +1,14 @@
-//! The longest (interval, add) through windows of time: line stabbing with integer coefficients.
+//! What (interval, add) pass through windows of time: line stabbing with integer coefficients.
 //!
 //! Step `k` (from 1) of a command comes `k·interval + add·k(k−1)/2` ticks after the step before the command. Divided by
 //! `k`, that is the line `interval + (add/2)·x` over `x = k − 1`, and the window around the step, divided by `k`, is an
 //! upright slit that the line must pass. O'Rourke's on-line algorithm keeps the steepest and the flattest line through all
 //! slits so far. Both coefficients are integers, so once few values of `add` are left, each is followed by itself with
 //! the range of intervals that it allows.
+//!
+//! Slits may be left out: what passes those that were taken is then tried on all of them before it is given out.
+
+use crate::windows::Steps;
 
 /// The most windows that one command can pass.
 pub(crate) const FIT_STEPS_MAX: u32 = 4096;
@@ -14,6 +18,8 @@ const CANDIDATES_MAX: usize = 4;
 const TRIES_MAX: i64 = 4;
 /// Values of `add` that take one byte on the wire.
 const ADD_SHORT: core::ops::RangeInclusive<i64> = -32..=95;
+/// Values that take two at most.
+const ADD_TWO_BYTES: core::ops::RangeInclusive<i64> = -4096..=12_287;
 /// Values of `add` that the wire can express.
 const ADD_MIN: i64 = i16::MIN as i64;
 const ADD_MAX: i64 = i16::MAX as i64;
@@ -34,6 +40,20 @@ impl Fit {
         let best = floor((aim - 0.5 * candidate.add * n * (n - 1.0)) / n + 0.5);
         let interval = best.min(floor(candidate.high)).max(ceil(candidate.low)).max(1) as u32;
         Self { interval, add: if count == 1 { 0 } else { candidate.add as i16 }, count }
+    }
+
+    /// Whether all of `steps` come within their windows; if so, the farthest of them may set the `record`.
+    fn passes(&self, steps: &Steps<'_>, record: &mut f64) -> bool {
+        let (is_within, is_farther) = steps.check(f64::from(self.interval), f64::from(self.add), *record);
+        if is_within && is_farther {
+            *record = self.worst(steps);
+        }
+        is_within
+    }
+
+    /// How far the farthest of `steps` is from its time.
+    fn worst(&self, steps: &Steps<'_>) -> f64 {
+        steps.worst(f64::from(self.interval), f64::from(self.add))
     }
 
     /// How far the last step is from `aim`.
@@ -68,7 +88,7 @@ struct Candidate {
 /// Windows taken so far and what passes them.
 #[derive(Clone, Debug)]
 pub(crate) struct Stabbing {
-    /// Windows taken.
+    /// Number of the last step whose window was taken.
     count: u32,
     steepest: Line,
     flattest: Line,
@@ -76,8 +96,6 @@ pub(crate) struct Stabbing {
     lows: Hull,
     /// Upper ends that can still touch the flattest line: convex from below.
     highs: Hull,
-    /// All slits, while lines are followed.
-    slits: Vec<(f64, f64)>,
     candidates: [Candidate; CANDIDATES_MAX],
     /// Number of candidates; 0 while lines are followed.
     followed: usize,
@@ -92,7 +110,6 @@ impl Stabbing {
             flattest: flat,
             lows: Hull::default(),
             highs: Hull::default(),
-            slits: Vec::new(),
             candidates: [Candidate::default(); CANDIDATES_MAX],
             followed: 0,
         }
@@ -101,25 +118,25 @@ impl Stabbing {
     pub(crate) fn clear(&mut self) {
         self.count = 0;
         self.followed = 0;
-        self.slits.clear();
     }
 
-    /// Windows taken since the last [`Self::clear`].
+    /// The last step whose window was taken since the last [`Self::clear`]; they count from 1.
     #[inline]
     pub(crate) const fn count(&self) -> u32 {
         self.count
     }
 
-    /// Takes the window of the next step, in ticks after the step before the command; `false`, and nothing changes, where
-    /// no line passes it too. The first window is always taken: it must be at least one tick wide and reach above 1.
-    #[inline]
-    pub(crate) fn take(&mut self, earliest: f64, latest: f64) -> bool {
-        let x = f64::from(self.count);
-        let inverse = 1.0 / (x + 1.0);
-        let (low, high) = (earliest * inverse, latest * inverse);
-        let taken = self.count < FIT_STEPS_MAX
-            && if self.followed > 0 { self.follow(x, low, high) } else { self.narrow(x, low, high) };
-        self.count += u32::from(taken);
+    /// Takes the window of step number `count`, in ticks after the step before the command; `false`, and nothing changes,
+    /// where no line passes it too. Numbers rise, from 1. The first window is always taken: it must be at least one tick
+    /// wide and reach above 1.
+    pub(crate) fn take(&mut self, count: u32, earliest: f64, latest: f64) -> bool {
+        let number = f64::from(count);
+        let inverse = 1.0 / number;
+        let (x, low, high) = (number - 1.0, earliest * inverse, latest * inverse);
+        let taken = if self.followed > 0 { self.follow(x, low, high) } else { self.narrow(x, low, high) };
+        if taken {
+            self.count = count;
+        }
         taken
     }
 
@@ -128,11 +145,9 @@ impl Stabbing {
         self.flattest = Line { offset: high, slope: f64::NEG_INFINITY };
         self.lows.restart(low);
         self.highs.restart(high);
-        self.slits.push((low, high));
     }
 
     /// The next slit, while lines are followed.
-    #[inline(never)]
     fn narrow(&mut self, x: f64, low: f64, high: f64) -> bool {
         if self.count == 0 {
             self.start(low, high);
@@ -143,7 +158,6 @@ impl Stabbing {
         if low > top || high < bottom || !self.has_add() {
             return false;
         }
-        self.slits.push((low, high));
         // A slit's end that no remaining line can touch needs no place in the hulls.
         if high < top {
             self.steepest = self.lows.tangent(x, high, |slope, best| slope <= best);
@@ -189,22 +203,9 @@ impl Stabbing {
     }
 
     /// The next slit, while candidates are followed.
-    #[inline]
     fn follow(&mut self, x: f64, low: f64, high: f64) -> bool {
         let half_x = 0.5 * x;
         let before = self.followed;
-        // The usual case in a long command.
-        if before == 1 {
-            let candidate = &mut self.candidates[0];
-            let rise = candidate.add * half_x;
-            let next_low = larger(candidate.low, low - rise);
-            let next_high = smaller(candidate.high, high - rise);
-            let passes = has_integer(next_low, next_high);
-            if passes {
-                (candidate.low, candidate.high) = (next_low, next_high);
-            }
-            return passes;
-        }
         let mut index = 0;
         while index < self.followed {
             let candidate = &mut self.candidates[index];
@@ -228,66 +229,81 @@ impl Stabbing {
         true
     }
 
-    /// The best command for the windows taken: it covers all of them where integers allow, at least one otherwise.
+    /// A command for all steps up to the last window taken, if a likely one passes those that were left out too. The last step
+    /// should come near `aim`, in ticks after the step before the command. Puts the farthest that a step has been off into
+    /// `record`.
     ///
     /// At least one window must have been taken.
-    pub(crate) fn fit(&self, aim: f64) -> Fit {
-        if self.followed > 0 {
-            let fits = self.candidates[..self.followed]
-                .iter()
-                .map(|&candidate| Fit::new(candidate, self.count, aim));
-            // A short `add` first, then the end; a tie is not left to the order of the candidates, which trials change.
-            let best = fits.min_by(|a, b| {
-                let long = |fit: &Fit| !ADD_SHORT.contains(&i64::from(fit.add));
-                let ends = || a.off(aim).total_cmp(&b.off(aim));
-                long(a).cmp(&long(b)).then_with(ends).then(a.add.cmp(&b.add))
-            });
-            return best.unwrap_or(Fit { interval: 1, add: 0, count: 1 });
+    pub(crate) fn fit(&self, steps: &Steps<'_>, aim: f64, record: &mut f64) -> Option<Fit> {
+        let steps = steps.first(self.count as usize);
+        let likely = self.likely(aim);
+        let fit = Fit::new(likely, self.count, aim);
+        if fit.passes(&steps, record) {
+            return Some(fit);
         }
-        if self.count == 1 {
-            let (low, high) = self.slits[0];
-            return Fit::new(Candidate { add: 0.0, low, high }, 1, aim);
+        let (low, high) = steps.intervals(likely.add);
+        if !has_integer(low, high) {
+            return None;
         }
-        let first = ceil(2.0 * self.flattest.slope);
-        let last = floor(2.0 * self.steepest.slope);
-        let middle = ceil(self.flattest.slope + self.steepest.slope - 0.5).clamp(ADD_MIN, ADD_MAX);
-        let short = (first.max(*ADD_SHORT.start()), last.min(*ADD_SHORT.end()));
-        let middle = if short.0 <= short.1 { middle.clamp(short.0, short.1) } else { middle };
-        let tries = || {
-            let around = (0..=2 * TRIES_MAX).map(|i| middle + if i % 2 == 0 { -(i / 2) } else { i / 2 + 1 });
-            around.filter(|add| (ADD_MIN..=ADD_MAX).contains(add))
-        };
-        for add in tries().filter(|add| (first..=last).contains(add)) {
-            let candidate = self.candidate(add);
-            if has_integer(candidate.low, candidate.high) {
-                return Fit::new(candidate, self.count, aim);
-            }
-        }
-        self.longest(tries(), aim)
+        let fit = Fit::new(Candidate { low, high, ..likely }, self.count, aim);
+        fit.passes(&steps, record).then_some(fit)
     }
 
-    /// The candidate that passes the most windows from the first on.
-    fn longest(&self, adds: impl Iterator<Item = i64>, aim: f64) -> Fit {
-        let mut best = (Candidate { add: 0.0, low: self.slits[0].0, high: self.slits[0].1 }, 1);
-        for add in adds {
-            let add = add as f64;
-            let mut reached = Candidate { add, low: self.slits[0].0, high: self.slits[0].1 };
-            let mut count = 1;
-            for (x, &(low, high)) in self.slits.iter().enumerate().skip(1) {
-                let rise = 0.5 * add * x as f64;
-                let next =
-                    Candidate { add, low: reached.low.max(low - rise), high: reached.high.min(high - rise) };
-                if !has_integer(next.low, next.high) {
-                    break;
+    /// The command that passes the most of the windows up to the last one taken, at least one.
+    pub(crate) fn fit_some(&self, steps: &Steps<'_>, record: &mut f64) -> Fit {
+        let steps = steps.first(self.count as usize);
+        // A window without a whole tick in it is served as near as can be.
+        let mut best = (Candidate { add: 0.0, low: 1.0, high: f64::INFINITY }, 1);
+        let mut attempt = |add: f64| {
+            if best.1 < self.count as usize {
+                let (count, (low, high)) = steps.prefix(add);
+                if count > best.1 {
+                    best = (Candidate { add, low, high }, count);
                 }
-                reached = next;
-                count += 1;
             }
-            if count > best.1 {
-                best = (reached, count);
+        };
+        if self.followed > 0 {
+            self.candidates[..self.followed].iter().for_each(|candidate| attempt(candidate.add));
+        } else {
+            let middle = self.middle_add();
+            for i in 0..=2 * TRIES_MAX {
+                let add = middle + if i % 2 == 0 { -(i / 2) } else { i / 2 + 1 };
+                attempt(add.clamp(ADD_MIN, ADD_MAX) as f64);
             }
         }
-        Fit::new(best.0, best.1, aim)
+        let (candidate, count) = best;
+        let fit = Fit::new(candidate, count as u32, steps.times[count - 1] - steps.base);
+        *record = larger(*record, fit.worst(&steps.first(count)));
+        fit
+    }
+
+    /// What is most likely to pass the windows that were left out.
+    fn likely(&self, aim: f64) -> Candidate {
+        let candidates = &self.candidates[..self.followed];
+        // A short `add` first, then the end; a tie is not left to the order of the candidates, which trials change.
+        let best = candidates.iter().copied().reduce(|a, b| {
+            let (fit_a, fit_b) = (Fit::new(a, self.count, aim), Fit::new(b, self.count, aim));
+            let long = |fit: &Fit| !ADD_SHORT.contains(&i64::from(fit.add));
+            let order = long(&fit_a).cmp(&long(&fit_b));
+            let order = order.then_with(|| fit_a.off(aim).total_cmp(&fit_b.off(aim)));
+            if order.then(fit_a.add.cmp(&fit_b.add)).is_le() { a } else { b }
+        });
+        best.unwrap_or_else(|| self.candidate(if self.count == 1 { 0 } else { self.middle_add() }))
+    }
+
+    /// Half-way between the extreme lines, or the nearest to it that is shorter on the wire, if one is between them too.
+    fn middle_add(&self) -> i64 {
+        let (flattest, steepest) = (self.flattest.slope, self.steepest.slope);
+        let middle = ceil(flattest + steepest - 0.5).clamp(ADD_MIN, ADD_MAX);
+        if ADD_SHORT.contains(&middle) {
+            return middle;
+        }
+        let (first, last) = (ceil(2.0 * flattest), floor(2.0 * steepest));
+        let shorter = [ADD_SHORT, ADD_TWO_BYTES].into_iter().find_map(|values| {
+            let (first, last) = (first.max(*values.start()), last.min(*values.end()));
+            (first <= last).then(|| middle.clamp(first, last))
+        });
+        shorter.unwrap_or(middle)
     }
 }
 
@@ -353,7 +369,7 @@ pub(crate) fn larger(a: f64, b: f64) -> f64 {
 }
 
 /// Whether an integer lies in `low ..= high`.
-fn has_integer(low: f64, high: f64) -> bool {
+pub(crate) fn has_integer(low: f64, high: f64) -> bool {
     high - low >= 1.0 || (low <= high && ceil(low) as f64 <= high)
 }
 

@@ -26,7 +26,7 @@ pub(crate) fn limits() -> Limits {
     }
 }
 
-fn generator(clock: Hertz) -> StepGenerator {
+pub(crate) fn generator(clock: Hertz) -> StepGenerator {
     let specs = STEP_DISTANCES.map(|distance| StepperSpec::new(Mm(distance)));
     StepGenerator::new(clock, &specs, Cartesian).unwrap()
 }
@@ -43,7 +43,11 @@ fn plan(from: [f64; 4], points: &[([f64; 4], f64)]) -> Vec<PlannedMove> {
 }
 
 /// All commands of a run; `eager` takes them after each move.
-fn commands(generator: &mut StepGenerator, planned: &[PlannedMove], eager: bool) -> Vec<StepCommand> {
+pub(crate) fn commands(
+    generator: &mut StepGenerator,
+    planned: &[PlannedMove],
+    eager: bool,
+) -> Vec<StepCommand> {
     let mut out = Vec::new();
     generator.begin_run(planned.first().map_or([0.0; 4], |first| first.from)).unwrap();
     for one in planned {
@@ -225,7 +229,7 @@ proptest! {
         for [x, y, length, start_time, accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, accel] in raw {
             let planned = PlannedMove {
                 tag: 0, from: at, to: [x, y, at[2], at[3]], direction: [0.6, 0.8, 0.0, 0.0], length, start_time,
-                accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, end_velocity: 0.0, accel, shape: None,
+                accel_time, cruise_time, decel_time, start_velocity, cruise_velocity, end_velocity: 0.0, accel, shape: None, bend: None,
             };
             if generator.push(&planned).is_ok() {
                 at = planned.to;
@@ -381,6 +385,7 @@ fn a_motor_that_waits_for_its_neighbour_never_blocks_a_busy_one() {
             end_velocity: speed,
             accel: 1000.0,
             shape: None,
+            bend: None,
         }
     };
     let mut at = [0.0, 0.0125, 0.0, 0.0];

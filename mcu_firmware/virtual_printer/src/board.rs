@@ -2,6 +2,7 @@
 //!
 //! Keeps the clock, which only the event loop moves. Does not know commands or when what happens next.
 
+use crate::gantry::Gantry;
 use crate::heater::{DutyMeter, FanState, HeaterState, Sensor};
 use crate::machine::{Filament, MOTORS_MAX};
 use crate::motor::MotorState;
@@ -9,6 +10,7 @@ use crate::pipe::Pipe;
 use crate::profile::BoardProfile;
 use crate::random::Random;
 use crate::recorder::Recorder;
+use crate::switch::Switch;
 use crate::thermistor::{ADC_MAX, counts};
 use firmware_core::{AnalogSample, Board, Pin, PinError, Pull};
 use units::{Celsius, Clock32, Ticks};
@@ -60,13 +62,20 @@ pub(crate) struct Axis {
     pub(crate) sag: f64,
 }
 
+/// What presses a switch.
+#[derive(Clone, Debug)]
+pub(crate) enum Sits {
+    /// A motor's own load: the motor, and the switch's place among its own.
+    Motor(usize, usize),
+    /// A carriage that several motors move: the axis, the switch, and where the carriage was in mm at which clock.
+    Carriage { axis: usize, switch: Switch, at: f64, clock: u64 },
+}
+
 /// A switch, as wired.
 #[derive(Clone, Debug)]
 pub(crate) struct EndstopWiring {
     pub(crate) name: String,
-    pub(crate) axis: usize,
-    /// Its place among the motor's switches.
-    pub(crate) switch: usize,
+    pub(crate) sits: Sits,
     pub(crate) inverted: bool,
     /// Set by a fault: what it reads as, whatever the carriage does.
     pub(crate) stuck: Option<bool>,
@@ -111,6 +120,7 @@ pub(crate) struct SimulatedBoard<R> {
     modes: Box<[Mode; 256]>,
     levels: Box<[bool; 256]>,
     pub(crate) axes: Vec<Axis>,
+    pub(crate) gantry: Gantry,
     pub(crate) endstops: Vec<EndstopWiring>,
     pub(crate) heaters: Vec<HeaterWiring>,
     pub(crate) fans: Vec<FanWiring>,
@@ -140,6 +150,7 @@ impl<R: Recorder> SimulatedBoard<R> {
             modes: Box::new([Mode::Unset; 256]),
             levels: Box::new([false; 256]),
             axes: Vec::new(),
+            gantry: Gantry::default(),
             endstops: Vec::new(),
             heaters: Vec::new(),
             fans: Vec::new(),
@@ -200,6 +211,7 @@ impl<R: Recorder> SimulatedBoard<R> {
         for axis in &mut self.axes {
             axis.motor.advance(now);
         }
+        self.move_carriages(now);
         for fan in &mut self.fans {
             let duty = fan.meter.take(now, ticks);
             fan.state.step(duty);
@@ -214,6 +226,29 @@ impl<R: Recorder> SimulatedBoard<R> {
                 heater.rotor = rotor;
             }
             heater.state.step(heater.stuck.unwrap_or(duty), fan, filament_mm3);
+        }
+    }
+
+    /// Where the head is now, as far as the motors hold it.
+    fn head(&mut self, now: u64) -> [f64; 3] {
+        let mut motors = [0.0; 3];
+        for (motor, axis) in motors.iter_mut().zip(&mut self.axes) {
+            *motor = axis.start_mm + axis.motor.place(now) * axis.step_mm;
+        }
+        self.gantry.head(motors)
+    }
+
+    /// Lets the carriages press their switches as they have moved since.
+    fn move_carriages(&mut self, now: u64) {
+        if !self.gantry.is_coupled() {
+            return;
+        }
+        let head = self.head(now);
+        for endstop in &mut self.endstops {
+            if let Sits::Carriage { axis, switch, at, clock } = &mut endstop.sits {
+                switch.moved(*at, head[*axis], *clock, now - *clock);
+                (*at, *clock) = (head[*axis], now);
+            }
         }
     }
 
@@ -330,8 +365,13 @@ impl<R: Recorder> Board for SimulatedBoard<R> {
     fn read_pin(&mut self, pin: Pin) -> bool {
         let index = usize::from(pin);
         if let Role::Endstop(endstop) = self.roles[index] {
+            let now = self.clock;
+            self.move_carriages(now);
             let endstop = &self.endstops[usize::from(endstop)];
-            let closed = self.axes[endstop.axis].motor.switch_closed(endstop.switch, self.clock);
+            let closed = match &endstop.sits {
+                Sits::Motor(axis, switch) => self.axes[*axis].motor.switch_closed(*switch, now),
+                Sits::Carriage { switch, .. } => switch.closed(now),
+            };
             return endstop.stuck.unwrap_or(closed) ^ endstop.inverted;
         }
         match self.modes[index] {

@@ -18,6 +18,7 @@
 
 mod board;
 mod faults;
+mod gantry;
 mod heater;
 mod machine;
 mod motor;
@@ -33,6 +34,7 @@ mod thermistor;
 mod wiring;
 
 pub use faults::{ByteFaults, FAULT_ITEMS, Failure, FailureKind, FaultError, Faults, HostStall, UserPause};
+pub use gantry::{Gantry, Towers};
 pub use heater::{Plant, Sensor};
 pub use machine::{
     ENDSTOPS_MAX, Endstop, Fan, Filament, Heater, MOTORS_MAX, Machine, Motor, Wire, WiringError,

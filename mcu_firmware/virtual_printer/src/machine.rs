@@ -3,6 +3,7 @@
 //! Pins go by the names that the board's dictionary gives them. Lengths in millimetres. Does not know `printer.cfg`:
 //! callers translate.
 
+use crate::gantry::Gantry;
 use crate::heater::{Plant, Sensor};
 use crate::motor::{Mechanics, TIME_STEP_US};
 use crate::switch::Side;
@@ -55,7 +56,8 @@ pub struct Endstop {
     pub name: String,
     /// High is closed.
     pub wire: Wire,
-    /// The motor whose load presses it, by its place in [`Machine::motors`].
+    /// The motor whose load presses it, by its place in [`Machine::motors`]; with a [`Gantry`] that couples motors, the
+    /// axis of the head, 0, 1, 2 for X, Y, Z.
     pub motor: usize,
     /// At which end it sits.
     pub side: Side,
@@ -105,6 +107,8 @@ pub struct Fan {
 pub struct Machine {
     /// Motors.
     pub motors: Vec<Motor>,
+    /// How the first three of them hold the head. One that couples motors has no stops of the frame.
+    pub gantry: Gantry,
     /// Limit switches.
     pub endstops: Vec<Endstop>,
     /// Heaters.
@@ -120,6 +124,7 @@ impl Default for Machine {
     fn default() -> Self {
         Self {
             motors: Vec::new(),
+            gantry: Gantry::default(),
             endstops: Vec::new(),
             heaters: Vec::new(),
             fans: Vec::new(),

@@ -461,6 +461,14 @@ impl MotorState {
         }
     }
 
+    /// Where the rotor is now, between two chunks of time too.
+    pub(crate) fn place(&mut self, now: u64) -> f64 {
+        self.advance(now);
+        let since = now - (self.chunk_end - self.chunk.ticks);
+        let ahead = if self.settled { 0.0 } else { self.velocity * since as f64 * self.tick_s };
+        self.rotor + ahead
+    }
+
     /// Where the field stands, in microsteps from power-up.
     pub(crate) fn field(&self) -> i64 {
         self.field

@@ -6,7 +6,7 @@
 //!
 //! Does not know a real clock, a port or a file.
 
-use crate::board::{Axis, EndstopWiring, FanWiring, HeaterWiring, SimulatedBoard};
+use crate::board::{Axis, EndstopWiring, FanWiring, HeaterWiring, SimulatedBoard, Sits};
 use crate::faults::{Failure, FailureKind, Faults};
 use crate::heater::THERMAL_STEP_S;
 use crate::machine::{Machine, WiringError};
@@ -389,9 +389,21 @@ impl<R: Recorder> VirtualPrinter<R> {
     }
 
     fn endstop_view(&self, endstop: &EndstopWiring) -> EndstopView {
-        let switch = self.board.axes[endstop.axis].motor.switches.get(endstop.switch);
-        let closed = switch.is_some_and(|switch| switch.closed(self.board.clock));
-        EndstopView { name: endstop.name.clone(), triggered: endstop.stuck.unwrap_or(closed) }
+        let now = self.board.clock;
+        let (closed, position) = match &endstop.sits {
+            Sits::Motor(axis, switch) => {
+                let axis = &self.board.axes[*axis];
+                let switch = axis.motor.switches.get(*switch);
+                (switch.is_some_and(|switch| switch.closed(now)), motor_view(axis).position)
+            }
+            Sits::Carriage { axis, switch, .. } => {
+                let motors: [f64; 3] = core::array::from_fn(|motor| {
+                    self.board.axes.get(motor).map_or(0.0, |it| motor_view(it).position.0)
+                });
+                (switch.closed(now), Mm(self.board.gantry.head(motors)[*axis]))
+            }
+        };
+        EndstopView { name: endstop.name.clone(), triggered: endstop.stuck.unwrap_or(closed), position }
     }
 }
 

@@ -73,4 +73,6 @@ pub struct EndstopView {
     pub name: String,
     /// The contact is closed (as it reads: a fault decides where there is one).
     pub triggered: bool,
+    /// Where the carriage stands that presses it.
+    pub position: Mm,
 }

@@ -1,6 +1,6 @@
 //! From a machine's description to the parts at work: names become numbers, and what cannot be is refused.
 
-use crate::board::{Axis, EndstopWiring, FanWiring, HeaterWiring, Role, SimulatedBoard};
+use crate::board::{Axis, EndstopWiring, FanWiring, HeaterWiring, Role, SimulatedBoard, Sits};
 use crate::heater::{DutyMeter, FanState, HeaterState};
 use crate::machine::{
     ENDSTOPS_MAX, Endstop, Fan, Filament, Heater, MOTORS_MAX, Machine, Motor, Wire, WiringError,
@@ -35,6 +35,10 @@ pub(crate) fn wire<R: Recorder>(
     for motor in &machine.motors {
         wire_motor(board, motor, machine.time_step_us.clamp(1, TIME_STEP_US))?;
     }
+    if !machine.gantry.is_sound() {
+        return Err(WiringError::Unsound { part: "gantry".to_owned() });
+    }
+    board.gantry = machine.gantry;
     for fan in &machine.fans {
         wire_fan(board, fan)?;
     }
@@ -180,23 +184,33 @@ fn wire_endstop<R: Recorder>(
     let index = board.endstops.len() as u8;
     claim_wire(board, &endstop.name, &endstop.wire, Role::Endstop(index))?;
     let clock_hz = board.profile.clock.0;
-    let axis = board
-        .axes
-        .get_mut(endstop.motor)
-        .ok_or_else(|| WiringError::NoSuchPart { part: endstop.name.clone(), wants: "motor" })?;
+    let missing = || WiringError::NoSuchPart { part: endstop.name.clone(), wants: "motor" };
+    if endstop.motor >= board.axes.len() {
+        return Err(missing());
+    }
     if !endstop.position.0.is_finite() {
         return Err(WiringError::Unsound { part: endstop.name.clone() });
     }
-    let closes = (endstop.position.0 - axis.start_mm) / axis.step_mm;
-    let differential = SWITCH_DIFFERENTIAL.0 / axis.step_mm;
     let random = Random::new(seed, Source::Bounce(index));
-    let switch = axis.motor.switches.len();
-    let rotor = axis.motor.rotor();
-    axis.motor.switches.push(Switch::new(endstop.side, closes, differential, clock_hz, rotor, random));
+    let sits = if board.gantry.is_coupled() {
+        let motors = board.axes.get(..3).ok_or_else(missing)?;
+        let head = board.gantry.head([motors[0].start_mm, motors[1].start_mm, motors[2].start_mm]);
+        let at = *head.get(endstop.motor).ok_or_else(missing)?;
+        let (closes, differential) = (endstop.position.0, SWITCH_DIFFERENTIAL.0);
+        let switch = Switch::new(endstop.side, closes, differential, clock_hz, at, random);
+        Sits::Carriage { axis: endstop.motor, switch, at, clock: board.clock }
+    } else {
+        let axis = &mut board.axes[endstop.motor];
+        let closes = (endstop.position.0 - axis.start_mm) / axis.step_mm;
+        let differential = SWITCH_DIFFERENTIAL.0 / axis.step_mm;
+        let switch = axis.motor.switches.len();
+        let rotor = axis.motor.rotor();
+        axis.motor.switches.push(Switch::new(endstop.side, closes, differential, clock_hz, rotor, random));
+        Sits::Motor(endstop.motor, switch)
+    };
     board.endstops.push(EndstopWiring {
         name: endstop.name.clone(),
-        axis: endstop.motor,
-        switch,
+        sits,
         inverted: endstop.wire.inverted,
         stuck: None,
     });

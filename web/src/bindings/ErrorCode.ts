@@ -8,6 +8,7 @@ export type ErrorCode =
   | 'heater-drifted'
   | 'target-out-of-range'
   | 'no-such-heater'
+  | 'no-such-profile'
   | 'cold-extrusion'
   | 'extrusion-too-long'
   | 'extrusion-too-thick'

@@ -143,3 +143,35 @@ fn dust_from_adding_up_relative_moves_neither_loses_nor_makes_a_full_circle() {
         }
     }
 }
+
+#[test]
+fn an_arcs_pieces_go_on_from_each_other_and_its_extremes_are_its_bounds() {
+    for (plane, clockwise, end) in
+        [(Plane::Xy, false, at(-3.0, 4.0, 2.0, 1.0)), (Plane::Xy, true, at(5.0, 0.0, 0.0, 1.0))]
+    {
+        let arc = arc(at(5.0, 0.0, 0.0, 0.0), end, plane, clockwise, Centre::Offset([-5.0, 0.0])).unwrap();
+        let mut chords = arc.chords(CHORD_TOLERANCE);
+        let (mut turned, mut count, mut at_angle) = (0.0, 0, chords.start_angle);
+        while let Some(piece) = chords.next_piece() {
+            assert_eq!(piece.is_first, count == 0);
+            assert!((piece.start_angle - at_angle).abs() < 1e-12);
+            assert!(piece.radii.iter().all(|radius| (radius - 5.0).abs() < 1e-12));
+            at_angle += piece.turn;
+            turned += piece.turn;
+            count += 1;
+        }
+        assert!((turned - arc.angle).abs() < 1e-12);
+        assert_eq!(count, arc.chords(CHORD_TOLERANCE).count());
+        let mut reach = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for place in arc.extremes().chain([arc.from, arc.to]) {
+            let [x, y, z, _] = place.to_array();
+            for (axis, value) in [x, y, z].into_iter().enumerate() {
+                reach[0][axis] = reach[0][axis].min(value);
+                reach[1][axis] = reach[1][axis].max(value);
+            }
+        }
+        for (found, bound) in reach.as_flattened().iter().zip(arc.bounds().as_flattened()) {
+            assert!((found - bound).abs() < 1e-9, "{reach:?} {:?}", arc.bounds());
+        }
+    }
+}

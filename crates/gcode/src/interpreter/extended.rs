@@ -6,8 +6,8 @@ use units::{Celsius, MmPerS, MmPerS2, Seconds};
 
 use super::{Interpreter, Out, Said};
 use crate::action::{
-    Action, AxisShaper, Heater, InputShaper, ObjectAction, ObjectId, PauseReason, ShaperName, VelocityLimit,
-    Wait,
+    Action, AxisShaper, Heater, InputShaper, MeshChange, ObjectAction, ObjectId, PauseReason, ShaperName,
+    SkewChange, VelocityLimit, Wait,
 };
 use crate::annotation::text_of;
 use crate::diagnostic::DiagnosticCode;
@@ -19,10 +19,9 @@ const POLYGON_POINTS_MAX: usize = 1024;
 /// The longest name of a command.
 const NAME_BYTES_MAX: usize = 64;
 
-/// Commands whose absence changes nothing in a print from this host: display, lights, cameras, an empty mesh, sensors that
-/// are not there. Sorted.
-const HARMLESS: [&str; 12] = [
-    "BED_MESH_CLEAR",
+/// Commands whose absence changes nothing in a print from this host: display, lights, cameras, sensors that are
+/// not there. Sorted.
+const HARMLESS: [&str; 11] = [
     "CLEAR_PAUSE",
     "SET_DISPLAY_GROUP",
     "SET_DISPLAY_TEXT",
@@ -38,11 +37,11 @@ const HARMLESS: [&str; 12] = [
 
 /// One `KEY=VALUE`.
 #[derive(Clone, Copy, Debug)]
-struct Parameter<'a> {
+pub(super) struct Parameter<'a> {
     key: &'a [u8],
-    value: &'a [u8],
-    start: usize,
-    end: usize,
+    pub(super) value: &'a [u8],
+    pub(super) start: usize,
+    pub(super) end: usize,
 }
 
 impl Parameter<'_> {
@@ -173,6 +172,20 @@ impl Interpreter {
                 self.tool = tool;
                 Action::SelectTool(tool)
             }
+            "SET_SKEW" => Action::Skew(call.set_skew(out)?),
+            "SKEW_PROFILE" => {
+                return Ok(call
+                    .profile("skew_correction", out)?
+                    .map(|it| Action::Skew(SkewChange::Load(it))));
+            }
+            "GET_CURRENT_SKEW" => Action::Skew(SkewChange::Report),
+            "CALC_MEASURED_SKEW" => Action::Skew(call.measured_skew(out)?),
+            "BED_MESH_PROFILE" => {
+                return Ok(call.profile("bed_mesh", out)?.map(|it| Action::BedMesh(MeshChange::Load(it))));
+            }
+            "BED_MESH_CLEAR" => Action::BedMesh(MeshChange::Clear),
+            "BED_MESH_OUTPUT" => Action::BedMesh(MeshChange::Report),
+            "BED_MESH_CALIBRATE" => return call.calibrate_mesh(out),
             "RESPOND" => Action::Message(call.get("MSG").map(|p| text_of(p.value)).unwrap_or_default()),
             "GET_POSITION" => Action::ReportPosition,
             "PAUSE" => Action::Pause(PauseReason::Requested),
@@ -213,20 +226,28 @@ impl Interpreter {
 }
 
 fn is_known(name: &str) -> bool {
-    const KNOWN: [&str; 15] = [
+    const KNOWN: [&str; 23] = [
         "ACTIVATE_EXTRUDER",
+        "BED_MESH_CALIBRATE",
+        "BED_MESH_CLEAR",
+        "BED_MESH_OUTPUT",
+        "BED_MESH_PROFILE",
+        "CALC_MEASURED_SKEW",
         "CANCEL_PRINT",
         "EXCLUDE_OBJECT",
         "EXCLUDE_OBJECT_DEFINE",
         "EXCLUDE_OBJECT_END",
         "EXCLUDE_OBJECT_START",
+        "GET_CURRENT_SKEW",
         "GET_POSITION",
         "PAUSE",
         "RESPOND",
         "SET_HEATER_TEMPERATURE",
         "SET_INPUT_SHAPER",
         "SET_PRESSURE_ADVANCE",
+        "SET_SKEW",
         "SET_VELOCITY_LIMIT",
+        "SKEW_PROFILE",
         "TEMPERATURE_WAIT",
         "TURN_OFF_HEATERS",
     ];
@@ -246,14 +267,14 @@ fn unknown_macro(bytes: &[u8], columns: Range<usize>, out: &mut Out<'_>) {
 }
 
 /// A known command with its parameters.
-struct Call<'a> {
-    name: &'a str,
-    columns: Range<usize>,
+pub(super) struct Call<'a> {
+    pub(super) name: &'a str,
+    pub(super) columns: Range<usize>,
     list: &'a [Parameter<'a>],
 }
 
 impl Call<'_> {
-    fn get(&self, key: &str) -> Option<&Parameter<'_>> {
+    pub(super) fn get(&self, key: &str) -> Option<&Parameter<'_>> {
         self.list.iter().find(|p| p.is(key))
     }
 
@@ -304,7 +325,7 @@ impl Call<'_> {
         Err(Said)
     }
 
-    fn required(&self, key: &str, out: &mut Out<'_>) -> Result<&Parameter<'_>, Said> {
+    pub(super) fn required(&self, key: &str, out: &mut Out<'_>) -> Result<&Parameter<'_>, Said> {
         self.get(key).ok_or_else(|| {
             let message = format!("{} needs {key}=. The line is skipped; slice the file again.", self.name);
             out.say(Error, DiagnosticCode::MissingValue, self.columns.clone(), message);

@@ -3,6 +3,7 @@
 //! Knows nothing of machines (see the crate's header). A line either takes effect as a whole or not at all.
 
 mod extended;
+mod level;
 mod machine;
 mod moves;
 mod report;

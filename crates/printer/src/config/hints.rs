@@ -3,7 +3,12 @@
 /// What an option holds, with an example.
 pub(super) fn hint(key: &str) -> &'static str {
     match key {
-        "kinematics" => "`kinematics: cartesian`",
+        "kinematics" => "`kinematics: cartesian`, corexy, corexz, hybrid_corexy, hybrid_corexz or delta",
+        "delta_radius" => "the distance in mm from the middle to where the arms' carriages ride, e.g. 134",
+        "print_radius" => "the radius in mm of what can be printed on, e.g. 110",
+        "minimum_z_position" => "the lowest position in mm that Z may go to, e.g. 0",
+        "arm_length" => "the length of the diagonal arms in mm, from joint to joint, e.g. 270",
+        "angle" => "the tower's direction in degrees: usually 210, 330 and 90 for a, b and c",
         "max_velocity" => "the machine's top speed in mm/s, e.g. 300",
         "max_accel" => "the machine's acceleration in mm/s², e.g. 3000",
         "max_z_velocity" => "the top speed of Z in mm/s, e.g. 15",
@@ -78,6 +83,14 @@ pub(super) fn hint(key: &str) -> &'static str {
         "check_gain_time" => "the seconds in which a heater must gain heating_gain, e.g. 20",
         "hysteresis" | "heating_gain" => "a temperature difference in °C, e.g. 2",
         "timeout" => "the seconds without orders after which heaters and motors are switched off, e.g. 600",
+        "xy_skew" | "xz_skew" | "yz_skew" => "how far one axis leans in the other in mm/mm, e.g. 0.002",
+        "points" => "the heights in mm, a row of X for each Y on an indented line of its own",
+        "min_x" | "max_x" | "min_y" | "max_y" => "where the mesh begins or ends in mm, e.g. 35",
+        "x_count" | "y_count" => "the number of points along that axis, e.g. 5",
+        "fade_start" | "fade_end" => "a height in mm, e.g. 1 and 10",
+        "fade_target" => "what is added to Z above the fade in mm, e.g. 0",
+        "split_delta_z" => "the largest error of Z along a move in mm, e.g. 0.025",
+        "tension" | "bicubic_tension" => "the spline's tension, 0 to 2, e.g. 0.2",
         "retract_length" | "unretract_extra_length" => "a length of filament in mm, e.g. 0.8",
         "baud" => "the serial line's rate, e.g. 250000",
         "serial" => "the board's serial port",

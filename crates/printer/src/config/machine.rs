@@ -4,7 +4,8 @@ use units::{Mm, MmPerS, MmPerS2, MmPerS3, Seconds};
 
 use super::Builder;
 use super::diagnostics::excerpt;
-use super::reader::{Checked, Range};
+use super::kinematics::{self, DeltaOptions, Kind, Kinematics};
+use super::reader::{Checked, Range, Reported};
 
 /// The board. Which port it is on is the shell's to know; the name is kept for display.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -13,13 +14,6 @@ pub struct McuConfig {
     pub serial: String,
     /// Rate of a real serial line, bits per second. USB ignores it.
     pub baud: u32,
-}
-
-/// How motors move the head.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kinematics {
-    /// A motor an axis.
-    Cartesian,
 }
 
 /// What becomes of a move that is faster than its motors' torque allows.
@@ -122,20 +116,14 @@ pub(super) fn mcu(builder: &mut Builder<'_>) -> Checked<McuConfig> {
     Ok(McuConfig { serial: serial.or(canbus).unwrap_or_default(), baud: baud? })
 }
 
-/// Reports a machine of another kind. Its other sections mean other things, so judging them would only add noise.
-pub(super) fn is_other_kinematics(builder: &mut Builder<'_>) -> bool {
-    let Some(entry) = builder.document.peek("printer", "kinematics") else { return false };
-    if entry.value.is_empty() || entry.value == "cartesian" {
-        return false;
-    }
-    let problem = "is not supported yet: only `cartesian` machines can be driven so far";
-    builder.log.error(entry.line, format!("[printer] kinematics: `{}` {problem}", excerpt(&entry.value)));
-    true
-}
-
-pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
+/// `[printer]`, and what it says of a delta.
+pub(super) fn printer(
+    builder: &mut Builder<'_>,
+    kind: Option<Kind>,
+) -> Checked<(MachineConfig, Option<DeltaOptions>)> {
     let mut reader = builder.required_section("printer")?;
-    let kinematics = reader.required_text("kinematics").map(|_| Kinematics::Cartesian);
+    let kinematics = reader.required_text("kinematics").and_then(|_| kind.ok_or(Reported));
+    let delta = (kind == Some(Kind::Delta)).then(|| kinematics::delta_options(&mut reader));
     let max_velocity = reader.number("max_velocity", Range::above(0.0).to(VELOCITY_MAX));
     let max_accel = reader.number("max_accel", Range::above(0.0).to(ACCEL_MAX));
     let corner = reader.number_or("square_corner_velocity", 5.0, Range::from(0.0).to(VELOCITY_MAX));
@@ -177,8 +165,8 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
     let [max_x_accel, max_y_accel] = xy_accel;
     let (max_velocity, max_accel) = (max_velocity?, max_accel?);
     old_decel?;
-    Ok(MachineConfig {
-        kinematics: kinematics?,
+    let config = MachineConfig {
+        kinematics: kinematics?.linear(),
         max_velocity: MmPerS(max_velocity),
         max_accel: MmPerS2(max_accel),
         square_corner_velocity: MmPerS(corner?),
@@ -194,7 +182,8 @@ pub(super) fn printer(builder: &mut Builder<'_>) -> Checked<MachineConfig> {
         junction_deviation: junction_deviation?.map(Mm),
         unreachable_speed: unreachable_speed?,
         max_jerk: max_jerk?.map(MmPerS3),
-    })
+    };
+    Ok((config, delta.transpose()?))
 }
 
 pub(super) fn idle_timeout(builder: &mut Builder<'_>) -> Checked<IdleTimeoutConfig> {

@@ -7,10 +7,12 @@
 //! Nothing is ignored in silence: what is not understood is a diagnostic. Where leaving something out would make the
 //! machine move or heat otherwise than its owner expects, that is an error and there is no [`PrinterConfig`].
 
+mod bed;
 mod diagnostics;
 mod document;
 mod dynamics;
 mod hints;
+mod kinematics;
 mod machine;
 mod pin;
 mod reader;
@@ -22,15 +24,17 @@ mod torque;
 pub use diagnostics::{CONFIG_DIAGNOSTICS_MAX, ConfigDiagnostic, Severity};
 pub use document::CONFIG_BYTES_MAX;
 pub use dynamics::AxisShaperConfig;
-pub use machine::{
-    FirmwareRetraction, IdleTimeoutConfig, Kinematics, MachineConfig, McuConfig, UnreachableSpeed,
-};
+pub use kinematics::{DeltaConfig, Kinematics, TowerConfig};
+pub use machine::{FirmwareRetraction, IdleTimeoutConfig, MachineConfig, McuConfig, UnreachableSpeed};
 pub use pin::{PinSpec, Pull};
 pub use stepper::{MotorConfig, StepperConfig};
 pub use thermal::{ControlConfig, ExtruderConfig, FanConfig, HeaterConfig};
 
+use std::sync::Arc;
+
 use motion::MotorAbility;
 
+use crate::transform::Profiles;
 use diagnostics::Log;
 use reader::{Checked, PinRegistry, Reader, Reported};
 
@@ -41,7 +45,8 @@ pub struct PrinterConfig {
     pub mcu: McuConfig,
     /// `[printer]`.
     pub printer: MachineConfig,
-    /// `[stepper_x]`, `[stepper_y]`, `[stepper_z]`, in this order.
+    /// `[stepper_x]`, `[stepper_y]`, `[stepper_z]`, in this order: each says what there is to say of its axis, and of a
+    /// motor. Those of a delta are its towers' motors; where the head may be is said of the axes all the same.
     pub steppers: [StepperConfig; 3],
     /// `[extruder]`, if the machine has one.
     pub extruder: Option<ExtruderConfig>,
@@ -57,6 +62,8 @@ pub struct PrinterConfig {
     pub firmware_retraction: Option<FirmwareRetraction>,
     /// `[motor_torque …]` of X, Y, Z and the extruder: what a motor can do at each speed, where that is known.
     pub abilities: [Option<MotorAbility>; 4],
+    /// `[skew_correction …]` and `[bed_mesh …]`: what G-code can load.
+    pub profiles: Arc<Profiles>,
     /// `[force_move] enable_force_move`: positions may be set by hand.
     pub force_move: bool,
 }
@@ -114,15 +121,12 @@ impl Builder<'_> {
 fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
     let document = document::read(text, log);
     let mut builder = Builder { document, pins: PinRegistry::default(), log };
-    if machine::is_other_kinematics(&mut builder) {
-        return Err(Reported);
-    }
+    let kind = kinematics::kind(&mut builder)?;
     // All sections are read before the first missing one ends this, so that one reading shows every mistake.
     let mcu = machine::mcu(&mut builder);
-    let printer = machine::printer(&mut builder);
-    let x = stepper::axis(&mut builder, "stepper_x");
-    let y = stepper::axis(&mut builder, "stepper_y");
-    let z = stepper::axis(&mut builder, "stepper_z");
+    let mut printer = machine::printer(&mut builder, kind);
+    let steppers = kinematics::steppers(&mut builder, kind, &mut printer);
+    let printer = printer.map(|(printer, _)| printer);
     let custom = thermal::custom_sensors(&mut builder);
     let limits = printer.map(|printer| (printer.max_velocity, printer.max_accel));
     let extruder = thermal::extruder(&mut builder, &custom, limits);
@@ -132,11 +136,20 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
     let input_shaper = dynamics::input_shaper(&mut builder);
     let firmware_retraction = machine::firmware_retraction(&mut builder);
     let force_move = machine::force_move(&mut builder);
-    let motors = [&x, &y, &z].map(|axis| axis.as_ref().ok().map(|axis| axis.motor.clone()));
+    let profiles = bed::profiles(&mut builder);
     let feeder = extruder.as_ref().ok().and_then(Option::as_ref).map(|extruder| extruder.motor.clone());
-    let [mx, my, mz] = motors;
-    let motors = [("stepper_x", mx), ("stepper_y", my), ("stepper_z", mz), ("extruder", feeder)];
-    let abilities = motors.map(|(name, motor)| torque::motor_torque(&mut builder, name, motor.as_ref()));
+    let motors = kinematics::motor_names(kind).into_iter().zip(
+        steppers
+            .each_ref()
+            .map(|stepper| stepper.as_ref().ok().map(|stepper| stepper.motor.clone()))
+            .into_iter()
+            .chain([feeder]),
+    );
+    let mut abilities = Vec::new();
+    for (motor, (name, config)) in motors.enumerate() {
+        let is_alone = kind.is_none_or(|kind| kind.is_alone(motor));
+        abilities.push(torque::motor_torque(&mut builder, name, config.as_ref(), is_alone));
+    }
     if printer.as_ref().is_ok_and(|it| it.max_jerk.is_some())
         && abilities.iter().any(|it| it.as_ref().is_ok_and(Option::is_some))
     {
@@ -148,17 +161,18 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
     Ok(PrinterConfig {
         mcu: mcu?,
         printer: printer?,
-        steppers: [x?, y?, z?],
+        steppers: {
+            let [x, y, z] = steppers;
+            [x?, y?, z?]
+        },
         extruder: extruder?,
         heater_bed: heater_bed?,
         fan: fan?,
         idle_timeout: idle_timeout?,
         input_shaper: input_shaper?,
         firmware_retraction: firmware_retraction?,
-        abilities: {
-            let [x, y, z, e] = abilities;
-            [x?, y?, z?, e?]
-        },
+        abilities: abilities.into_iter().collect::<Checked<Vec<_>>>()?.try_into().map_err(|_| Reported)?,
+        profiles: profiles?,
         force_move: force_move?,
     })
 }
@@ -166,6 +180,11 @@ fn build(text: &str, log: &mut Log) -> Checked<PrinterConfig> {
 /// A machine for tests.
 #[cfg(test)]
 pub(crate) const SMALL_MACHINE: &str = include_str!("small_machine.cfg");
+/// A delta for tests.
+#[cfg(test)]
+pub(crate) const SMALL_DELTA: &str = include_str!("small_delta.cfg");
 
+#[cfg(test)]
+mod kinematics_tests;
 #[cfg(test)]
 mod tests;

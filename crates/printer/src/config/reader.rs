@@ -234,6 +234,18 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// The same of all options whose names begin so.
+    pub(super) fn without_effect_beginning(&mut self, prefix: &str, why: &str) {
+        let keys: Vec<String> =
+            self.section.entries.keys().filter(|key| key.starts_with(prefix)).cloned().collect();
+        for key in keys {
+            if let Some(entry) = self.section.entries.remove(&key) {
+                let name = excerpt(&self.section.name);
+                self.log.info(entry.line, format!("[{name}] {} has no effect: {why}", excerpt(&key)));
+            }
+        }
+    }
+
     /// Options of Klipper that change what the machine does but are not supported yet.
     pub(super) fn not_supported(&mut self, keys: &[&'static str], consequence: &str) {
         for &key in keys {

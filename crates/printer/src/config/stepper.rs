@@ -1,4 +1,4 @@
-//! `[stepper_x]`, `[stepper_y]`, `[stepper_z]`, and the motor half that an extruder shares with them.
+//! `[stepper_x]`, `[stepper_y]`, `[stepper_z]`, and what an extruder and a delta's towers share with them.
 
 use units::{Mm, MmPerS, Seconds};
 
@@ -135,11 +135,12 @@ fn gear_ratio(reader: &mut Reader<'_>) -> Checked<f64> {
     Err(reader.error("gear_ratio", format!("`{}` {problem}", excerpt(&text))))
 }
 
+/// Where an axis goes.
 #[derive(Clone, Copy)]
-struct Span {
-    min: f64,
-    max: f64,
-    endstop: f64,
+pub(super) struct Span {
+    pub(super) min: f64,
+    pub(super) max: f64,
+    pub(super) endstop: f64,
 }
 
 fn span(reader: &mut Reader<'_>) -> Checked<Span> {
@@ -193,24 +194,71 @@ pub(super) fn axis(builder: &mut Builder<'_>, name: &str) -> Checked<StepperConf
     let endstop_pin = reader.pin("endstop_pin", PinUse::Input);
     let span = span(&mut reader);
     let homing_positive_dir = homing_direction(&mut reader, span);
-    let speed = Range::above(0.0).to(HOMING_SPEED_MAX);
-    let homing_speed = reader.number_or("homing_speed", 5.0, speed);
-    let second = reader.optional_number("second_homing_speed", speed);
-    let retract_speed = reader.optional_number("homing_retract_speed", speed);
-    let retract_dist = reader.number_or("homing_retract_dist", 5.0, Range::from(0.0).to(1_000.0));
+    let speeds = HomingSpeeds::read(&mut reader);
     reader.finish();
-    let (span, homing_speed) = (span?, homing_speed?);
-    Ok(StepperConfig {
-        name: name.to_owned(),
-        motor: motor?,
-        endstop_pin: endstop_pin?,
-        position_endstop: Mm(span.endstop),
-        position_min: Mm(span.min),
-        position_max: Mm(span.max),
-        homing_speed: MmPerS(homing_speed),
-        second_homing_speed: MmPerS(second?.unwrap_or(homing_speed / 2.0)),
-        homing_retract_speed: MmPerS(retract_speed?.unwrap_or(homing_speed)),
-        homing_retract_dist: Mm(retract_dist?),
-        homing_positive_dir: homing_positive_dir?,
-    })
+    Ok(speeds?.stepper(name, motor?, endstop_pin?, span?, homing_positive_dir?))
+}
+
+/// How an axis looks for its endstop.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct HomingSpeeds {
+    homing: MmPerS,
+    second: MmPerS,
+    retract: MmPerS,
+    retract_dist: Mm,
+}
+
+impl HomingSpeeds {
+    /// The options that say so.
+    pub(super) const KEYS: &[&'static str] =
+        &["homing_speed", "second_homing_speed", "homing_retract_speed", "homing_retract_dist"];
+
+    pub(super) fn read(reader: &mut Reader<'_>) -> Checked<Self> {
+        let speed = Range::above(0.0).to(HOMING_SPEED_MAX);
+        let homing = reader.number_or("homing_speed", 5.0, speed);
+        let second = reader.optional_number("second_homing_speed", speed);
+        let retract = reader.optional_number("homing_retract_speed", speed);
+        let retract_dist = reader.number_or("homing_retract_dist", 5.0, Range::from(0.0).to(1_000.0));
+        let homing = homing?;
+        Ok(Self {
+            homing: MmPerS(homing),
+            second: MmPerS(second?.unwrap_or(homing / 2.0)),
+            retract: MmPerS(retract?.unwrap_or(homing)),
+            retract_dist: Mm(retract_dist?),
+        })
+    }
+
+    /// Those of another one.
+    pub(super) const fn of(stepper: &StepperConfig) -> Self {
+        Self {
+            homing: stepper.homing_speed,
+            second: stepper.second_homing_speed,
+            retract: stepper.homing_retract_speed,
+            retract_dist: stepper.homing_retract_dist,
+        }
+    }
+
+    /// With all the rest of an axis.
+    pub(super) fn stepper(
+        self,
+        name: &str,
+        motor: MotorConfig,
+        endstop_pin: PinSpec,
+        span: Span,
+        homing_positive_dir: bool,
+    ) -> StepperConfig {
+        StepperConfig {
+            name: name.to_owned(),
+            motor,
+            endstop_pin,
+            position_endstop: Mm(span.endstop),
+            position_min: Mm(span.min),
+            position_max: Mm(span.max),
+            homing_speed: self.homing,
+            second_homing_speed: self.second,
+            homing_retract_speed: self.retract,
+            homing_retract_dist: self.retract_dist,
+            homing_positive_dir,
+        }
+    }
 }

@@ -55,7 +55,7 @@ fn the_extruders_limits_follow_from_nozzle_and_filament() {
 }
 
 /// The machine with the first `old` replaced, or, where `old` is empty, with text put after it.
-fn with(old: &str, new: &str) -> String {
+pub(super) fn with(old: &str, new: &str) -> String {
     assert!(SMALL_MACHINE.contains(old), "`{old}` is not there");
     if old.is_empty() {
         return format!("{SMALL_MACHINE}{new}");
@@ -68,7 +68,7 @@ fn line_of(text: &str, what: &str) -> u32 {
 }
 
 /// Asserts that a change gives one diagnostic, on the line that holds `at` (none: the whole file), saying `words`.
-fn assert_diagnosed(text: &str, severity: Severity, at: &str, words: &str) {
+pub(super) fn assert_diagnosed(text: &str, severity: Severity, at: &str, words: &str) {
     let (config, diagnostics) = parse(text);
     let line = if at.is_empty() { 0 } else { line_of(text, at) };
     assert_eq!(config.is_some(), severity != Severity::Error, "{diagnostics:#?}");
@@ -86,7 +86,7 @@ fn every_wrong_value_is_an_error_on_its_line() {
         ("max_velocity: 300", "max_velocity: nan", "max_velocity: nan", "must be above 0"),
         ("max_velocity: 300", "max_velocity: 1e300", "1e300", "must be above 0 and at most 10000"),
         ("max_velocity: 300", "max_velocity:", "max_velocity:", "it has no value"),
-        ("kinematics: cartesian", "kinematics: delta", "delta", "only `cartesian` machines"),
+        ("kinematics: cartesian", "kinematics: polar", "polar", "there are cartesian, corexy,"),
         ("step_pin: gpio2", "step_pin: ^gpio2", "^gpio2", "an output has no pull-up"),
         ("step_pin: gpio2", "step_pin: probe:x", "probe:x", "only pins of the main board"),
         ("rotation_distance: 40", "rotation_distance: 0", "rotation_distance: 0", "must be above 0"),
@@ -397,5 +397,87 @@ fn a_torque_that_no_motor_has_is_told_with_its_line() {
             diagnostics.iter().any(|it| it.message.contains(said) && it.line > 0),
             "{wrong}: {diagnostics:#?}"
         );
+    }
+}
+
+/// A mesh as `SAVE_CONFIG` leaves it behind the machine file.
+const SAVED_MESH: &str = "
+#*# <---------------------- SAVE_CONFIG ---------------------->
+#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.
+#*#
+#*# [bed_mesh default]
+#*# version = 1
+#*# points =
+#*# \t  0.110000, 0.042500, 0.012500, 0.120000
+#*# \t  -0.035000, -0.035000, -0.067500, 0.060000
+#*# \t  0.150000, 0.065000, 0.020000, 0.160000
+#*# tension = 0.2
+#*# min_x = 20.0
+#*# algo = lagrange
+#*# y_count = 3
+#*# mesh_y_pps = 2
+#*# min_y = 10.0
+#*# x_count = 4
+#*# max_y = 110.0
+#*# mesh_x_pps = 2
+#*# max_x = 200.0
+#*#
+#*# [skew_correction calm]
+#*# xy_skew = 0.004
+";
+
+#[test]
+fn meshes_and_skews_are_read_as_they_were_saved() {
+    let options = "\n[skew_correction]\n[bed_mesh]\nspeed: 120\nmesh_min: 35, 6\nmesh_max: 240, 198\n\
+        probe_count: 5, 3\nalgorithm: bicubic\nfaulty_region_1_min: 1, 2\nfade_end: 10\nfade_target: 0\n\
+        zero_reference_position: 20, 10\n";
+    let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}{options}{SAVED_MESH}"));
+    assert!(diagnostics.iter().all(|it| it.severity == Severity::Info), "{diagnostics:#?}");
+    let profiles = config.unwrap().profiles;
+    assert_eq!(profiles.skews["calm"], crate::transform::Skew { xy: 0.004, xz: 0.0, yz: 0.0 });
+    let mesh = &profiles.meshes["default"];
+    let at = |x, y| mesh.machine_from_gcode([x, y, 0.0])[2];
+    // Less what it is where Z is to be 0.
+    for (place, height) in
+        [([20.0, 10.0], 0.11), ([200.0, 10.0], 0.12), ([20.0, 60.0], -0.035), ([200.0, 110.0], 0.16)]
+    {
+        assert!((at(place[0], place[1]) - (height - 0.11)).abs() < 1e-12, "{place:?}");
+    }
+    assert_eq!(mesh.machine_from_gcode([50.0, 50.0, 30.0]), [50.0, 50.0, 30.0]);
+    assert!(machine().profiles.meshes.is_empty());
+}
+
+#[test]
+fn a_mesh_that_is_wrong_is_told_what() {
+    for (old, new, told) in [
+        ("algo = lagrange", "algo = spline", "`spline` is not `lagrange` or `bicubic`"),
+        ("x_count = 4", "x_count = 5", "a row has 4 points, x_count is 5"),
+        ("y_count = 3", "y_count = 4", "3 rows, y_count is 4"),
+        ("y_count = 3", "y_count = 2", "whole number from 3 to 100"),
+        ("0.060000", "nan", "`nan` is no height"),
+        ("0.060000", "1e300", "`1e300` is no height"),
+        ("0.060000", "x", "`x` is no height"),
+        ("max_x = 200.0", "max_x = 20.0", "1 mm apart"),
+        ("max_x = 200.0", "max_x = -20.0", "1 mm apart"),
+        ("min_y = 10.0", "", "[bed_mesh default] min_y: it is missing"),
+        ("version = 1", "version = 2", "whole number from 1 to 1"),
+        ("xy_skew = 0.004", "xy_skew = 0.4", "must be from -0.25 to 0.25"),
+    ] {
+        assert!(SAVED_MESH.contains(old), "{old}");
+        let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}{}", SAVED_MESH.replacen(old, new, 1)));
+        assert_eq!(config, None, "{new}");
+        assert!(diagnostics.iter().any(|it| it.message.contains(told)), "{told}: {diagnostics:#?}");
+    }
+    let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}\n[bed_mesh]\nfade_end: 1.1\n{SAVED_MESH}"));
+    assert_eq!(config, None);
+    assert!(
+        diagnostics.iter().any(|it| it.message.contains("fade_end less fade_start is 0.100 mm")),
+        "{diagnostics:#?}"
+    );
+    for option in
+        ["mesh_min: 5", "probe_count: 2", "mesh_pps: 1,2,3", "algorithm: x", "zero_reference_position: a, b"]
+    {
+        let (config, _) = parse(&format!("{SMALL_MACHINE}\n[bed_mesh]\n{option}\n"));
+        assert_eq!(config, None, "{option}");
     }
 }

@@ -21,13 +21,19 @@ const INERTIA_GCM2_MAX: f64 = 1e9;
 /// kg·m² in a g·cm².
 const KG_M2: f64 = 1e-7;
 
-/// Reads the section of a motor, if it has one.
+/// Reads the section of a motor, if it has one. It is refused where the motor does not move a single axis `is_alone` on.
 pub(super) fn motor_torque(
     builder: &mut Builder<'_>,
     name: &str,
     motor: Option<&MotorConfig>,
+    is_alone: bool,
 ) -> Checked<Option<MotorAbility>> {
     let Some(mut reader) = builder.section(&format!("motor_torque {name}")) else { return Ok(None) };
+    if !is_alone {
+        let problem = "this motor moves more than one axis, for which torque cannot be planned yet; leave the section \
+                       out and limit the machine by max_accel and max_velocity";
+        return Err(reader.error("pull_out_torque", problem));
+    }
     let pull_out = table(&mut reader, "pull_out_torque");
     let slowing = reader.has("slowing_torque").then(|| table(&mut reader, "slowing_torque")).transpose();
     let inertia = reader.number("inertia", Range::above(0.0).to(INERTIA_GCM2_MAX));

@@ -20,6 +20,7 @@ use crate::{
     machine,
     planner::{Next, Source},
     preview::layers::Layers,
+    transform::Transform,
 };
 
 /// Things in the file that are read in one go.
@@ -49,7 +50,7 @@ pub struct Interruption {
     pub layer_z: Mm,
     /// See `layer_z`.
     pub layer_line: u32,
-    /// Where the lines have the nozzle at the end of `line`: X, Y, Z.
+    /// Where the machine stands at the end of `line`: X, Y, Z.
     pub position: [Mm; 3],
     /// The lowest and highest Z at which the power may have gone, by file and journal; `None` where Z was being moved by
     /// something else.
@@ -67,6 +68,8 @@ pub struct Survey {
     config: PrinterConfig,
     source: Source,
     endstops: [f64; 3],
+    /// From the file's coordinates to the machine's, at the line that was read last.
+    transform: Transform,
     /// The last line that is known to have been made.
     known: u32,
     layers: Layers,
@@ -102,8 +105,11 @@ impl Survey {
         if !journal.is_of(config) {
             return Err(refused("the machine file is not the one it was begun with"));
         }
+        let transform = Transform::recorded(journal.transform(), &config.profiles)
+            .map_err(|problem| PrinterError::new(ErrorCode::NoSuchProfile, problem))?;
         let mut source = Source::new(machine::gcode_settings(config));
         if let Some([x, y, z, _]) = journal.began_at() {
+            let [x, y, z] = transform.gcode_from_machine([x, y, z]);
             source.interpreter.set_axes(Some(x), Some(y), Some(z));
         }
         let before = journal.start_line.map_or(0, |line| line.saturating_sub(1));
@@ -113,6 +119,7 @@ impl Survey {
             journal,
             config: config.clone(),
             source,
+            transform,
             known,
             layers: Layers::new(),
             at_known: None,
@@ -175,6 +182,7 @@ impl Survey {
             return;
         }
         let gcode::Position { x, y, z, .. } = self.source.interpreter.position();
+        let [x, y, z] = self.transform.machine_from_gcode([x, y, z]);
         // What the user set is not in the file, what the file set later holds.
         let [speed, flow] = self.journal.factors();
         let interpreter = &mut self.source.interpreter;
@@ -221,8 +229,14 @@ impl Survey {
                 None
             }
             Action::Home { x, y, z } => {
-                let home = |axis: usize, is: bool| is.then_some(self.endstops[axis]);
-                self.source.interpreter.set_axes(home(0, *x), home(1, *y), home(2, *z));
+                let axes = machine::homed_together(&self.config, [*x, *y, *z]);
+                let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.endstops[axis]));
+                self.source.interpreter.set_axes(x, y, z);
+                None
+            }
+            Action::Skew(_) | Action::BedMesh(_) => {
+                // One that cannot be loaded has ended the print there.
+                let _ = self.transform.set(action, &self.config.profiles);
                 None
             }
             _ => None,
@@ -230,7 +244,8 @@ impl Survey {
         if let Some((way, feed, from_z, to_z)) = interval.filter(|_| self.at_known.is_some()) {
             self.reach_line = line;
             let [low, high] = self.z_range;
-            self.z_range = [low.min(from_z).min(to_z), high.max(from_z).max(to_z)];
+            let [least, most] = self.transform.added_to_z();
+            self.z_range = [low.min(from_z.min(to_z) + least), high.max(from_z.max(to_z) + most)];
             // Without acceleration it is faster than it can have been.
             let speed = feed.0.min(self.config.printer.max_velocity.0).max(f64::MIN_POSITIVE);
             self.since += Seconds(way / speed);
@@ -259,7 +274,12 @@ impl Survey {
             layer_line: known.layer_line,
             position: known.position.map(Mm),
             z_range: z_range.map(|range| range.map(Mm)),
-            standings: Standings::new(&self.config.steppers[2].motor, height, z_range),
+            standings: Standings::new(
+                &self.config.steppers[2].motor,
+                // Without a motor of its own the place of no coil says where Z is.
+                height.filter(|_| machine::has_z_motor(&self.config)),
+                z_range,
+            ),
             factors: known.factors,
         })
     }

@@ -25,6 +25,7 @@ fn journal(start_line: Option<u32>, records: &[Record]) -> Journal {
         clock: 12_000_000,
         position: [0.0; 4],
         homed: [false; 3],
+        transform: crate::transform::TransformRecord::default(),
         confirmed: [].into(),
         confirm_all: false,
         start_line,

@@ -22,7 +22,7 @@ pub(crate) use self::{
     rows::{BoardQueue, MotorQueue, Row},
 };
 
-use crate::{config::PrinterConfig, machine::MOTORS, planner::Position};
+use crate::{config::PrinterConfig, machine::MOTORS, planner::Position, transform::TransformRecord};
 
 /// The format that is written.
 pub const FORMAT: u32 = 2;
@@ -154,6 +154,9 @@ pub enum Record {
         position: Position,
         /// See `position`.
         homed: [bool; 3],
+        /// What made up for skew and bed.
+        #[serde(default, skip_serializing_if = "TransformRecord::is_none")]
+        transform: TransformRecord,
         /// Blocking lines that were confirmed …
         confirmed: BTreeSet<u32>,
         /// … or all of them.
@@ -281,6 +284,7 @@ pub struct Journal {
     clock: Hertz,
     position: Position,
     homed: [bool; 3],
+    transform: TransformRecord,
     /// Blocking lines that were confirmed.
     pub confirmed: BTreeSet<u32>,
     /// Whether all of them were.
@@ -339,6 +343,7 @@ impl Journal {
             clock,
             position,
             homed,
+            transform,
             confirmed,
             confirm_all,
             start_line,
@@ -355,6 +360,7 @@ impl Journal {
             clock: Hertz(clock),
             position,
             homed,
+            transform,
             confirmed,
             confirm_all,
             start_line,
@@ -404,6 +410,11 @@ impl Journal {
     /// Where the machine stood when the print began, where it began with its file.
     pub(crate) fn began_at(&self) -> Option<Position> {
         self.start_line.is_none().then_some(self.position)
+    }
+
+    /// What made up for skew and bed when it began.
+    pub(crate) const fn transform(&self) -> &TransformRecord {
+        &self.transform
     }
 
     /// Whether it was begun on this machine.

@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 
 use gcode::{Heater, LineNumber};
 use motion::PlannedMove;
-use steps::{StepCommand, StepCommandKind};
+use steps::{Geometry, StepCommand, StepCommandKind};
 use units::{Celsius, Clock32, Seconds, Ticks};
 use wire::RowCheck;
 
@@ -116,6 +116,7 @@ pub(crate) struct Replay {
     /// By how much each direction pin's level is turned round.
     inverted: [bool; MOTORS],
     endstops: [f64; 3],
+    geometry: Geometry,
     runs: u32,
     position_at_start: Position,
     motors: [Motor; MOTORS],
@@ -156,6 +157,7 @@ impl Replay {
         let wanted = journal.runs.iter().rfind(|run| run.id == queue.id);
         let wanted = *wanted.ok_or_else(|| differs("the board carries out something else"))?;
         let mut planner = Planner::new(config, clock)?;
+        planner.set_recorded_transform(&journal.transform)?;
         if journal.start_line.is_none() {
             planner.stand_at(journal.position);
             (0..3).for_each(|axis| planner.guard.set_homed(axis, journal.homed[axis]));
@@ -177,6 +179,7 @@ impl Replay {
             queue,
             inverted: [pins[0], pins[1], pins[2], extruder],
             endstops,
+            geometry: machine::geometry(config),
             runs: 0,
             position_at_start: journal.position,
             motors: core::array::from_fn(|_| Motor::default()),
@@ -362,6 +365,7 @@ impl Replay {
             }
             Barrier::WaitTemperature { heater, target, .. } => self.set_target(heater, target),
             Barrier::MotorsOff(motors) => {
+                let motors = self.geometry.coupled(motors);
                 (0..3)
                     .filter(|&axis| motors[axis])
                     .for_each(|axis| self.planner.guard.set_homed(axis, false));

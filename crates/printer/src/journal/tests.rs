@@ -11,6 +11,10 @@ fn began() -> Record {
         clock: 12_000_000,
         position: [0.1 + 0.2, 1.0 / 3.0, f64::MIN_POSITIVE, 4.0],
         homed: [true, false, true],
+        transform: TransformRecord {
+            skew: crate::transform::Skew { xy: 0.1 + 0.2, xz: -1.0 / 3.0, yz: 0.0 },
+            mesh: Some("cold bed".into()),
+        },
         confirmed: [3, 9].into(),
         confirm_all: false,
         start_line: None,

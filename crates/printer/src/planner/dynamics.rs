@@ -5,10 +5,11 @@
 
 use std::collections::VecDeque;
 
-use gcode::{AxisShaper, InputShaper};
-use steps::{Advance, Filters, StepGenerator};
+use gcode::{Action, AxisShaper, InputShaper};
+use steps::{Advance, Filters, Geometry, StepGenerator};
 use units::Seconds;
 
+use super::Planner;
 use crate::config::{AxisShaperConfig, PrinterConfig};
 
 /// How the paths of the axes are changed before they become steps.
@@ -106,7 +107,7 @@ impl Course {
     }
 
     /// A run begins.
-    pub(super) fn begin_run(&mut self, generator: &mut StepGenerator) {
+    pub(super) fn begin_run(&mut self, generator: &mut StepGenerator<Geometry>) {
         self.advances.clear();
         let filters = self.read.filters();
         if filters != self.filters {
@@ -117,9 +118,27 @@ impl Course {
     }
 
     /// So many moves have been given to the generator.
-    pub(super) fn planned(&mut self, moves: u64, generator: &mut StepGenerator) {
+    pub(super) fn planned(&mut self, moves: u64, generator: &mut StepGenerator<Geometry>) {
         while let Some((_, advance)) = self.advances.pop_front_if(|(after, _)| *after <= moves) {
             generator.set_advance(&advance);
+        }
+    }
+}
+
+impl Planner {
+    /// Takes an advance or a shaper; one that changes the filters lets the machine come to rest first.
+    pub(super) fn set_dynamics(&mut self, action: &Action) {
+        let read = self.course.read();
+        let dynamics = match action {
+            Action::PressureAdvance { advance, smooth_time } => read.with_advance(*advance, *smooth_time),
+            Action::InputShaper(change) => read.with_shaper(change),
+            _ => return,
+        };
+        self.step_rates.set_advance(dynamics.effective_advance().slope_max());
+        if self.course.set(dynamics, self.moves_pushed) {
+            self.finish_run();
+        } else if self.moves_planned == self.moves_pushed {
+            self.course.planned(self.moves_planned, &mut self.generator);
         }
     }
 }

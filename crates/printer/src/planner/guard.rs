@@ -3,18 +3,14 @@
 //! Knows positions and limits, not speeds (the look-ahead keeps those) and not temperatures (it is told whether the
 //! nozzle may extrude). Positions are machine coordinates in mm, the extruder in mm of filament.
 
-use gcode::Move;
+use gcode::{LineNumber, Move};
+use motion::Bend;
 
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
+    reach::{AXES, Reach},
 };
-
-/// Names of the axes in messages.
-const AXES: [&str; 3] = ["X", "Y", "Z"];
-
-/// How far beyond a limit still counts as on it, in mm: the dust of decimal arithmetic, far below a step.
-const LIMIT_SLACK_MM: f64 = 1e-6;
 
 /// Whether the nozzle may push filament.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +27,7 @@ pub enum ExtrusionPermit {
 /// Judges moves before they are planned.
 #[derive(Clone, Debug)]
 pub struct Guard {
-    limits_mm: [(f64, f64); 3],
+    reach: Reach,
     homed: [bool; 3],
     extruder: Option<ExtruderGuard>,
     /// Kept up to date by the owner.
@@ -49,7 +45,6 @@ struct ExtruderGuard {
 impl Guard {
     /// The limits of a machine file; no axis is homed yet.
     pub fn new(config: &PrinterConfig) -> Self {
-        let limits_mm = config.steppers.each_ref().map(|axis| (axis.position_min.0, axis.position_max.0));
         let extruder = config.extruder.as_ref().map(|extruder| ExtruderGuard {
             filament_area_mm2: extruder.filament_area_mm2(),
             cross_section_max_mm2: extruder.max_extrude_cross_section,
@@ -60,7 +55,7 @@ impl Guard {
             extruder.as_ref().is_none_or(|extruder: &ExtruderGuard| extruder.min_extrude_celsius <= 0.0);
         let extrusion =
             if cold_allowed { ExtrusionPermit::Allowed } else { ExtrusionPermit::TooCold { celsius: 0.0 } };
-        Self { limits_mm, homed: [false; 3], extruder, extrusion }
+        Self { reach: Reach::new(config), homed: [false; 3], extruder, extrusion }
     }
 
     /// Which axes have a known position.
@@ -75,27 +70,50 @@ impl Guard {
 
     /// Why this move may not be made, if so.
     pub fn judge(&self, mv: &Move) -> Result<(), PrinterError> {
-        let from = [mv.from.x, mv.from.y, mv.from.z];
-        let to = [mv.to.x, mv.to.y, mv.to.z];
+        let [from, to] = [mv.from, mv.to].map(|at| [at.x, at.y, at.z]);
+        self.judge_travel(from, to, mv.line)?;
+        self.judge_extrusion(mv)
+    }
+
+    /// Why the head may not go there, if so.
+    pub(crate) fn judge_travel(
+        &self,
+        from: [f64; 3],
+        to: [f64; 3],
+        line: LineNumber,
+    ) -> Result<(), PrinterError> {
+        let out_of_range = |detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(line.0);
         for axis in 0..3 {
             if from[axis] == to[axis] {
                 continue;
             }
             if !self.homed[axis] {
                 let detail = format!("axis {} has not been homed", AXES[axis]);
-                return Err(PrinterError::new(ErrorCode::NotHomed, detail).at_line(mv.line.0));
+                return Err(PrinterError::new(ErrorCode::NotHomed, detail).at_line(line.0));
             }
-            let (min, max) = self.limits_mm[axis];
-            if !(min - LIMIT_SLACK_MM..=max + LIMIT_SLACK_MM).contains(&to[axis]) {
-                let detail =
-                    format!("{} {:.3} mm lies outside {min:.3} to {max:.3} mm", AXES[axis], to[axis]);
-                return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(mv.line.0));
-            }
+            self.reach.judge_axis(axis, to[axis]).map_err(out_of_range)?;
         }
-        self.judge_extrusion(mv)
+        if from != to {
+            self.reach.judge_way(from, to).map_err(out_of_range)?;
+        }
+        Ok(())
     }
 
-    fn judge_extrusion(&self, mv: &Move) -> Result<(), PrinterError> {
+    /// Why this piece of an arc may not be made, where its straight one may: it bulges.
+    pub(crate) fn judge_bend(
+        &self,
+        bend: &Bend,
+        from: [f64; 4],
+        to: [f64; 4],
+        line: LineNumber,
+    ) -> Result<(), PrinterError> {
+        self.reach
+            .judge_bend(bend, [from[0], from[1], from[2]], [to[0], to[1], to[2]])
+            .map_err(|detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail).at_line(line.0))
+    }
+
+    /// Why it may not push so much filament, if so.
+    pub(crate) fn judge_extrusion(&self, mv: &Move) -> Result<(), PrinterError> {
         let filament = mv.to.e - mv.from.e;
         if filament == 0.0 {
             return Ok(());
@@ -113,17 +131,19 @@ impl Guard {
         }
         let travel = [mv.to.x - mv.from.x, mv.to.y - mv.from.y, mv.to.z - mv.from.z];
         let length = libm::sqrt(travel.iter().map(|d| d * d).sum());
-        if length == 0.0 {
+        // Filament that is pulled back while the head travels is not laid along the way either.
+        if length == 0.0 || filament < 0.0 {
             if filament.abs() > extruder.extrude_only_max_mm {
+                let how = if length == 0.0 { "without travel" } else { "pulled back" };
                 return fail(
                     ErrorCode::ExtrusionTooLong,
                     format!(
-                        "{filament:.1} mm of filament without travel, max_extrude_only_distance is {:.1} mm",
+                        "{filament:.1} mm of filament {how}, max_extrude_only_distance is {:.1} mm",
                         extruder.extrude_only_max_mm
                     ),
                 );
             }
-        } else if filament > 0.0 {
+        } else {
             let area = filament / length * extruder.filament_area_mm2;
             // Dabs shorter than a nozzle's bore are how slicers prime and wipe: their ratio means nothing.
             let dab = filament * extruder.filament_area_mm2 <= extruder.cross_section_max_mm2 * DAB_MM;

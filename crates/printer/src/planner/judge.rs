@@ -1,10 +1,12 @@
 //! What a move may do, before it is planned: where it may go, how fast its motors can make it, and what the user is told.
 
-use gcode::{Diagnostic, DiagnosticCode, LineNumber, Move, Severity, VelocityLimit};
+use gcode::{Arc, Diagnostic, DiagnosticCode, LineNumber, Move, Severity, VelocityLimit};
+use motion::Bend;
 use units::MmPerS;
 
 use super::{Planned, Planner, Position, Source};
 use crate::{
+    arcs,
     config::UnreachableSpeed,
     error::{ErrorCode, PrinterError},
     machine,
@@ -36,26 +38,54 @@ impl Planner {
         }
     }
 
-    pub(super) fn judge_and_push(&mut self, mv: &Move, source: &Source) -> Result<(), PrinterError> {
+    /// An arc may lead out of the machine between two places that are in it.
+    pub(super) fn judge_arc(&self, arc: &Arc) -> Result<(), PrinterError> {
+        let [x, y, z, _] = self.position;
+        arc.extremes().try_for_each(|to| {
+            let to = self.transform.machine_from_gcode([to.x, to.y, to.z]);
+            self.guard.judge_travel([x, y, z], to, arc.line)
+        })
+    }
+
+    /// Plans a move along a straight line, or along `bend` where the machine is at its start. Where axes are not square, or
+    /// the bed is not flat, it is a straight line.
+    pub(super) fn judge_and_push(
+        &mut self,
+        mv: &Move,
+        bend: Option<&Bend>,
+        source: &mut Source,
+    ) -> Result<(), PrinterError> {
+        if !self.transform.is_identity() {
+            return self.judge_and_take_apart(mv, source);
+        }
         let e_offset = source.e_offset;
         let to = [mv.to.x, mv.to.y, mv.to.z, mv.to.e + e_offset];
         // Judged from where the machine is, not from where the source believes that it is.
         let [x, y, z, e] = self.position;
         let from = gcode::Position { x, y, z, e: e - e_offset };
         self.guard.judge(&Move { from, ..*mv })?;
-        let feed = self.feed(mv, to, source);
-        self.judge_torque(to, feed, mv.line)?;
-        self.push(to, feed, mv.line, source.pace())
+        let bend = bend.filter(|bend| bend.fits(&self.position, &to));
+        if let Some(bend) = bend {
+            self.guard.judge_bend(bend, self.position, to, mv.line)?;
+        }
+        let mut feed = mv.feed;
+        for end in arcs::straight_ends(self.position, to, bend) {
+            feed = feed.min(self.feed(mv.feed, mv.line, end, source));
+        }
+        for end in arcs::straight_ends(self.position, to, bend) {
+            self.judge_torque(end, feed, mv.line)?;
+        }
+        self.push(to, bend, feed, mv.line, source.pace())
     }
 
     /// A move's feed; one that a factor has made faster than the motors can follow is slowed down to what they can.
-    pub(super) fn feed(&mut self, mv: &Move, to: Position, source: &Source) -> MmPerS {
+    pub(super) fn feed(&mut self, wanted: MmPerS, line: LineNumber, to: Position, source: &Source) -> MmPerS {
         if source.interpreter.speed_factor() <= 1.0 && source.interpreter.flow_factor() <= 1.0 {
-            return mv.feed;
+            return wanted;
         }
-        let feed = self.step_rates.slowed(self.position, to, mv.feed);
-        if feed < mv.feed && !core::mem::replace(&mut self.said.slowed, true) {
-            self.notice(mv.line, "a move is made slower than the factor asks: a motor cannot step faster");
+        let feed = self.step_rates.slowed(self.position, to, wanted);
+        if feed < wanted && !core::mem::replace(&mut self.said.slowed, true) {
+            self.notice(line, "a move is made slower than the factor asks: a motor cannot step faster");
         }
         feed
     }

@@ -5,42 +5,56 @@
 //! knows no host time and no board clock: times are seconds, and step commands are ticks, from the start of a **run of
 //! motion**, which is a stretch that begins and ends at rest.
 
+#[cfg(test)]
+mod arc_tests;
 mod dynamics;
+#[cfg(test)]
+mod estimate_tests;
+mod estimates;
 #[cfg(test)]
 mod extrusion_tests;
 mod guard;
 mod item;
 mod judge;
+mod level;
+#[cfg(test)]
+mod level_tests;
 mod paces;
 mod report;
 mod skip;
 mod source;
 #[cfg(test)]
 mod tests;
+mod trace;
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, sync::Arc};
 
 use gcode::{Action, LineNumber, Wait};
-use motion::{Bound, Limits, LookAhead, MoveRequest, PlannedMove};
-use steps::{PushError, StepGenerator};
+use motion::{Bend, Bound, Limits, LookAhead, MoveRequest, PlannedMove};
+use steps::{Geometry, PushError, StepGenerator};
 use units::{Hertz, MmPerS, Seconds, Ticks};
 
 use dynamics::Course;
+pub use estimates::{Estimates, FEATURE_NAMES, LayerTotal, MoveEstimate, MoveKind, Total};
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
 use paces::Paces;
-pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanStream, Ramps};
+pub use report::{MotorReport, PLAN_CLOCK, PlanOptions, PlanReport, PlanSink, PlanStream, Ramps};
 pub(crate) use skip::{Skip, Skipped};
 pub(crate) use source::Next;
 pub use source::{SOURCE_BYTES_MAX, Source};
+use trace::Trace;
+pub use trace::TraceSample;
 
 pub use crate::pace::Pace;
 
 use crate::{
+    arcs,
     config::{PrinterConfig, UnreachableSpeed},
     error::{ErrorCode, PrinterError},
     machine::{self, EXTRUDER},
     step_rate::StepRates,
+    transform::{Profiles, Transform},
 };
 
 /// How far the run of motion is.
@@ -87,7 +101,7 @@ pub struct Planner {
     machine_limits: Limits,
     limits: Limits,
     look_ahead: LookAhead,
-    generator: StepGenerator,
+    generator: StepGenerator<Geometry>,
     position: Position,
     clock: Hertz,
     run: Run,
@@ -103,11 +117,19 @@ pub struct Planner {
     barrier: Option<(LineNumber, Barrier)>,
     said: Said,
     course: Course,
+    /// From the G-code's coordinates to the machine's, for the moves that are read from now on …
+    transform: Transform,
+    /// … and what can be loaded.
+    profiles: Arc<Profiles>,
     step_rates: StepRates,
     unreachable_speed: UnreachableSpeed,
     is_broken: bool,
+    /// All axes are homed together.
+    homes_together: bool,
     /// What the plan is held against, where somebody wants to know.
     bound: Option<Box<Bound>>,
+    /// Where somebody wants to see the axes' paths.
+    trace: Option<Box<Trace>>,
 }
 
 impl Planner {
@@ -135,10 +157,14 @@ impl Planner {
             barrier: None,
             said: Said::default(),
             course: Course::new(config),
+            transform: Transform::default(),
+            profiles: Arc::clone(&config.profiles),
             step_rates: StepRates::new(config, clock),
             unreachable_speed: config.printer.unreachable_speed,
             is_broken: false,
+            homes_together: machine::homed_together(config, [true, false, false]) == [true; 3],
             bound: None,
+            trace: None,
         })
     }
 
@@ -147,7 +173,7 @@ impl Planner {
         self.bound = Some(Box::new(Bound::new(config.abilities.to_vec())));
     }
 
-    /// Where the last accepted move ends.
+    /// Where the last accepted move ends, in machine coordinates.
     pub const fn position(&self) -> Position {
         self.position
     }
@@ -173,7 +199,7 @@ impl Planner {
     }
 
     /// What the step generator counted so far.
-    pub fn generator(&self) -> &StepGenerator {
+    pub fn generator(&self) -> &StepGenerator<Geometry> {
         &self.generator
     }
 
@@ -190,24 +216,8 @@ impl Planner {
         self.position = position;
     }
 
-    /// Makes a source continue from where the machine is: before its first line, and whenever another source moved. Its
-    /// offsets are forgotten.
-    pub fn adopt(&mut self, source: &mut Source) {
-        let [x, y, z, e] = self.position;
-        source.interpreter.set_axes(Some(x), Some(y), Some(z));
-        source.e_offset = e - source.interpreter.position().e;
-        self.said = Said::default();
-    }
-
-    /// Tells a source whose move was refused, or stopped, that the machine stands here. Its offsets hold.
-    pub fn correct(&mut self, source: &mut Source) {
-        let [x, y, z, e] = self.position;
-        source.interpreter.stand_at(x, y, z);
-        source.e_offset = e - source.interpreter.position().e;
-    }
-
     /// As [`Self::adopt`], for a job, whose plan is to depend on nothing that was done before: the machine file's limits
-    /// hold again, and the filament counts from 0. At rest.
+    /// hold again, and the filament counts from 0. What makes up for skew and bed stays in force. At rest.
     pub fn begin_job(&mut self, source: &mut Source) {
         debug_assert!(self.is_at_rest(), "a job begins at rest");
         self.position[EXTRUDER] = 0.0;
@@ -222,6 +232,11 @@ impl Planner {
     /// A move could not be turned into steps, so that the run cannot be brought to rest: everything has to stop.
     pub const fn is_broken(&self) -> bool {
         self.is_broken
+    }
+
+    /// The axes that are homed where a line wants these to be.
+    pub(crate) fn homed_together(&self, axes: [bool; 3]) -> [bool; 3] {
+        if self.homes_together && axes.contains(&true) { [true; 3] } else { axes }
     }
 
     /// Lets the machine come to rest after the moves that were read; [`Planned::RunEnded`] tells when. Whether that
@@ -272,7 +287,7 @@ impl Planner {
         feed: MmPerS,
         line: LineNumber,
     ) -> Result<(), PrinterError> {
-        self.push(to, feed, line, Pace::default())
+        self.push(to, None, feed, line, Pace::default())
     }
 
     /// The next item of the plan.
@@ -291,6 +306,7 @@ impl Planner {
             match self.run {
                 Run::Ending => {
                     self.generator.end_run().map_err(|error| self.unsteppable(error, None))?;
+                    self.trace_paths();
                     self.run = Run::Draining;
                     continue;
                 }
@@ -310,8 +326,12 @@ impl Planner {
                 self.finish_run();
                 continue;
             }
-            if let Some(chord) = source.next_chord() {
-                self.judge_and_push(&chord, source)?;
+            if let Some(piece) = source.next_piece() {
+                self.push_piece(&piece, source)?;
+                continue;
+            }
+            if let Some(piece) = source.next_arc_piece() {
+                self.judge_and_push(&piece.chord, Some(&arcs::bend(&piece)), source)?;
                 continue;
             }
             match source.next() {
@@ -329,8 +349,11 @@ impl Planner {
     fn act(&mut self, action: Action, source: &mut Source) -> Result<(), PrinterError> {
         let line = source.line();
         match action {
-            Action::Move(mv) => self.judge_and_push(&mv, source)?,
-            Action::Arc(arc) => source.draw(&arc),
+            Action::Move(mv) => self.judge_and_push(&mv, None, source)?,
+            Action::Arc(arc) => {
+                self.judge_arc(&arc)?;
+                source.draw(&arc);
+            }
             Action::VelocityLimit(limit) => self.limit(limit),
             Action::SetTemperature { heater, target, wait: Wait::No } => {
                 self.defer(line, TimedAction::SetTemperature { heater, target });
@@ -345,7 +368,9 @@ impl Planner {
             Action::Object(object) => self.defer(line, TimedAction::Object(object)),
             Action::ReportTemperatures => self.defer(line, TimedAction::ReportTemperatures),
             Action::ReportPosition => self.defer(line, TimedAction::ReportPosition),
-            Action::Home { x, y, z } => self.barrier = Some((line, Barrier::Home([x, y, z]))),
+            Action::Home { x, y, z } => {
+                self.barrier = Some((line, Barrier::Home(self.homed_together([x, y, z]))));
+            }
             Action::Dwell(pause) if self.run == Run::Active && pause <= DWELL_IN_RUN_MAX => {
                 self.look_ahead.dwell(pause);
                 self.bound.iter_mut().for_each(|bound| bound.dwell(pause));
@@ -366,6 +391,11 @@ impl Planner {
             Action::TurnOffHeaters => self.defer(line, TimedAction::TurnOffHeaters),
             Action::Cancel => self.barrier = Some((line, Barrier::Cancel)),
             Action::PressureAdvance { .. } | Action::InputShaper(_) => self.set_dynamics(&action),
+            Action::Skew(_) | Action::BedMesh(_) => {
+                if let Some(text) = self.set_transform(&action, line)? {
+                    self.defer(line, TimedAction::Message(text));
+                }
+            }
             // The interpreter has the factors in its moves already; the machine file knows the machine's limits; there
             // is only one tool.
             Action::SpeedFactor(_)
@@ -374,22 +404,6 @@ impl Planner {
             | Action::SelectTool(_) => {}
         }
         Ok(())
-    }
-
-    /// Takes an advance or a shaper; one that changes the filters lets the machine come to rest first.
-    fn set_dynamics(&mut self, action: &Action) {
-        let read = self.course.read();
-        let dynamics = match action {
-            Action::PressureAdvance { advance, smooth_time } => read.with_advance(*advance, *smooth_time),
-            Action::InputShaper(change) => read.with_shaper(change),
-            _ => return,
-        };
-        self.step_rates.set_advance(dynamics.effective_advance().slope_max());
-        if self.course.set(dynamics, self.moves_pushed) {
-            self.finish_run();
-        } else if self.moves_planned == self.moves_pushed {
-            self.course.planned(self.moves_planned, &mut self.generator);
-        }
     }
 
     /// Attaches an action to the end of the moves read so far.
@@ -407,11 +421,20 @@ impl Planner {
         }
     }
 
-    fn push(&mut self, to: Position, feed: MmPerS, line: LineNumber, pace: Pace) -> Result<(), PrinterError> {
+    fn push(
+        &mut self,
+        to: Position,
+        bend: Option<&Bend>,
+        feed: MmPerS,
+        line: LineNumber,
+        pace: Pace,
+    ) -> Result<(), PrinterError> {
         if to == self.position {
             return Ok(());
         }
-        self.step_rates.judge_request(self.position, to, feed, &self.limits, line)?;
+        for end in arcs::straight_ends(self.position, to, bend) {
+            self.step_rates.judge_request(self.position, end, feed, &self.limits, line)?;
+        }
         if self.run == Run::None {
             self.look_ahead.begin_run();
             self.course.begin_run(&mut self.generator);
@@ -425,7 +448,7 @@ impl Planner {
         }
         let before = self.look_ahead.len();
         let request = MoveRequest { from: self.position, to, feed, tag: line.0 };
-        self.look_ahead.push(&request).map_err(|error| wrong(&error).at_line(line.0))?;
+        self.look_ahead.push_along(&request, bend).map_err(|error| wrong(&error).at_line(line.0))?;
         // The look-ahead drops moves without length.
         let pushed = (self.look_ahead.len() - before) as u64;
         if pushed > 0 {
@@ -434,7 +457,7 @@ impl Planner {
         self.moves_pushed += pushed;
         self.position = to;
         if let Some(bound) = &mut self.bound {
-            bound.push(&request, &self.limits);
+            bound.push_along(&request, bend, &self.limits);
         }
         Ok(())
     }
@@ -456,6 +479,7 @@ impl Planner {
             return Err(error);
         }
         self.generator.push(&planned).map_err(|error| self.unsteppable(error, Some(planned.tag)))?;
+        self.trace_paths();
         self.planned_until = Seconds(planned.end_time());
         let pace = self.paces.take(self.moves_planned);
         self.moves_planned += 1;

@@ -8,7 +8,9 @@ use wire::{
     block::{Block, PAYLOAD_BYTES_MAX},
 };
 
-use super::{Barrier, Planned, Planner, Source};
+use super::{
+    Barrier, Estimates, LayerTotal, MoveEstimate, Planned, Planner, Source, TimedAction, Total, TraceSample,
+};
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
@@ -46,6 +48,28 @@ pub struct PlanReport {
     pub filament_mm: f64,
     /// The least time that the same moves could take under the same limits, where it was asked for.
     pub bound: Option<Seconds>,
+    /// What each kind of extrusion takes, and what is none: [`Estimates::features`]. All times together are the print time.
+    pub features: Vec<(&'static str, Total)>,
+    /// What each layer takes, from the lowest; all times together are the print time.
+    pub layers: Vec<LayerTotal>,
+}
+
+/// Takes what a plan gives on its way.
+pub trait PlanSink {
+    /// A move has its final speeds.
+    fn mv(&mut self, _planned: &PlannedMove, _estimate: &MoveEstimate) {}
+
+    /// The axes' paths at the next time, where they were asked for ([`PlanOptions::trace`]).
+    fn sample(&mut self, _sample: &TraceSample) {}
+}
+
+/// Looks at planned moves only.
+struct EachMove<F>(F);
+
+impl<F: FnMut(&PlannedMove)> PlanSink for EachMove<F> {
+    fn mv(&mut self, planned: &PlannedMove, _: &MoveEstimate) {
+        (self.0)(planned);
+    }
 }
 
 /// What a plan may differ in from what would be printed.
@@ -61,6 +85,8 @@ pub struct PlanOptions {
     pub ramps: Option<Ramps>,
     /// How early or late a step may come, where not as usual ([`machine::STEP_ERROR_MAX`]); 1 ms at most.
     pub step_error: Option<Seconds>,
+    /// How far apart the axes' paths are sampled, where they are; above 0.
+    pub trace: Option<Seconds>,
 }
 
 /// How speed goes up and down along the path.
@@ -100,7 +126,14 @@ impl Ramps {
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        Self { feed_scale: 1.0, bound: false, minimum_cruise_ratio: None, ramps: None, step_error: None }
+        Self {
+            feed_scale: 1.0,
+            bound: false,
+            minimum_cruise_ratio: None,
+            ramps: None,
+            step_error: None,
+            trace: None,
+        }
     }
 }
 
@@ -113,6 +146,9 @@ pub struct PlanStream {
     payload: Vec<u8>,
     sequence: u8,
     report: PlanReport,
+    estimates: Estimates,
+    /// Up to here the present run's time has been given to a layer.
+    accounted: Seconds,
     /// Waits of the file outside of any run of motion.
     dwelt: Seconds,
 }
@@ -140,6 +176,9 @@ impl PlanStream {
         if options.bound {
             planner.bound(config);
         }
+        if let Some(step) = options.trace.filter(|step| step.0 > 0.0) {
+            planner.trace(step);
+        }
         planner.guard.extrusion = super::ExtrusionPermit::Allowed;
         let mut source = Source::new(machine::gcode_settings(config));
         planner.adopt(&mut source);
@@ -150,6 +189,8 @@ impl PlanStream {
             payload: Vec::with_capacity(PAYLOAD_BYTES_MAX),
             sequence: 0,
             report: PlanReport::default(),
+            estimates: Estimates::new(machine::filament_area_mm2(config)),
+            accounted: Seconds::ZERO,
             dwelt: Seconds::ZERO,
         })
     }
@@ -166,18 +207,37 @@ impl PlanStream {
         blocks: &mut Vec<u8>,
         each_move: impl FnMut(&PlannedMove),
     ) -> Result<(), PrinterError> {
+        self.feed_to(gcode, blocks, &mut EachMove(each_move))
+    }
+
+    /// The same, with all that there is to say of the plan.
+    pub fn feed_to(
+        &mut self,
+        gcode: &[u8],
+        blocks: &mut Vec<u8>,
+        sink: &mut impl PlanSink,
+    ) -> Result<(), PrinterError> {
         self.source.feed(gcode);
-        self.run(blocks, each_move)
+        self.run(blocks, sink)
     }
 
     /// Says that the file has ended, and tells what it amounts to.
     pub fn finish(
-        mut self,
+        self,
         blocks: &mut Vec<u8>,
         each_move: impl FnMut(&PlannedMove),
     ) -> Result<PlanReport, PrinterError> {
+        self.finish_to(blocks, &mut EachMove(each_move))
+    }
+
+    /// The same, with all that there is to say of the plan.
+    pub fn finish_to(
+        mut self,
+        blocks: &mut Vec<u8>,
+        sink: &mut impl PlanSink,
+    ) -> Result<PlanReport, PrinterError> {
         self.source.end();
-        self.run(blocks, each_move)?;
+        self.run(blocks, sink)?;
         self.send(blocks);
         let stats = self.planner.generator().stats();
         for (motor, stats) in self.report.motors.iter_mut().zip(stats) {
@@ -189,32 +249,66 @@ impl PlanStream {
             self.report.step_error_max = self.report.step_error_max.max(stats.max_error);
         }
         self.report.bound = self.planner.bound.as_ref().map(|bound| bound.total() + self.dwelt);
+        self.report.features = self.estimates.features().collect();
+        self.report.layers = self.estimates.layers().collect();
         Ok(self.report)
     }
 
-    fn run(
-        &mut self,
-        blocks: &mut Vec<u8>,
-        mut each_move: impl FnMut(&PlannedMove),
-    ) -> Result<(), PrinterError> {
+    fn run(&mut self, blocks: &mut Vec<u8>, sink: &mut impl PlanSink) -> Result<(), PrinterError> {
         loop {
             match self.planner.next(&mut self.source)? {
                 Planned::NeedsInput | Planned::EndOfSource => return Ok(()),
                 Planned::Move(planned, _) => {
                     self.report.moves += 1;
                     self.report.filament_mm += planned.to[EXTRUDER] - planned.from[EXTRUDER];
-                    each_move(&planned);
+                    self.account(Seconds(planned.start_time));
+                    self.accounted = Seconds(planned.end_time());
+                    sink.mv(&planned, &self.estimates.take(&planned));
+                    self.sample(sink);
                 }
                 Planned::Steps(command) => self.pack(&command, blocks),
-                Planned::RunStarted(_) => {
+                Planned::RunStarted(position) => {
+                    self.accounted = Seconds::ZERO;
+                    self.planner.trace.iter_mut().for_each(|trace| trace.begin_run(position));
                     for motor in 0..MOTORS {
                         self.pack_message(&Command::ResetStepClock { oid: motor as u8, clock: 0 }, blocks);
                     }
                 }
-                Planned::RunEnded(at) => self.report.print_time += at,
+                Planned::RunEnded(at) => {
+                    self.account(at);
+                    self.rest(at, sink);
+                }
+                Planned::Barrier { barrier: Barrier::Dwell(duration), .. } => {
+                    self.dwelt += duration;
+                    self.estimates.pause(duration);
+                    self.rest(duration, sink);
+                }
                 Planned::Barrier { barrier, .. } => self.pass(&barrier),
+                Planned::Timed { line, action: TimedAction::Annotation(annotation), .. } => {
+                    self.estimates.annotate(line.0, &annotation);
+                }
                 Planned::Timed { .. } | Planned::Notice(_) => {}
             }
+        }
+    }
+
+    /// Up to this time of the run nothing moves.
+    fn account(&mut self, until: Seconds) {
+        self.estimates.pause((until - self.accounted).max(Seconds::ZERO));
+    }
+
+    /// A run or a rest has ended after this time.
+    fn rest(&mut self, time: Seconds, sink: &mut impl PlanSink) {
+        self.report.print_time += time;
+        self.planner.trace.iter_mut().for_each(|trace| trace.last_until(time));
+        self.sample(sink);
+        self.planner.trace.iter_mut().for_each(|trace| trace.go_on_after(time));
+    }
+
+    fn sample(&mut self, sink: &mut impl PlanSink) {
+        let Some(trace) = &mut self.planner.trace else { return };
+        while let Some(sample) = trace.next() {
+            sink.sample(&sample);
         }
     }
 
@@ -227,11 +321,8 @@ impl PlanStream {
                 let at = |axis: usize| axes[axis].then_some(0.0);
                 self.source.interpreter.set_axes(at(0), at(1), at(2));
             }
-            Barrier::Dwell(duration) => {
-                self.report.print_time += *duration;
-                self.dwelt += *duration;
-            }
-            Barrier::WaitTemperature { .. }
+            Barrier::Dwell(_)
+            | Barrier::WaitTemperature { .. }
             | Barrier::MotorsOff(_)
             | Barrier::WaitForMoves
             | Barrier::WaitForTemperature { .. }

@@ -10,6 +10,7 @@ use super::{Planner, Source, source::Next};
 use crate::{
     error::{ErrorCode, PrinterError},
     machine::EXTRUDER,
+    transform::Transform,
 };
 
 /// Things in the file that are read in one go.
@@ -25,6 +26,17 @@ pub(crate) enum Skipped {
     Done,
 }
 
+/// Places of the machine that enclose whatever is between two of the G-code.
+fn corners(ends: [[f64; 3]; 2], transform: &Transform) -> impl Iterator<Item = [f64; 3]> {
+    let [_, most] = transform.added_to_z();
+    (0..4).map(move |corner: usize| [ends[corner % 2][0], ends[corner / 2][1]]).flat_map(move |[x, y]| {
+        ends.map(|[_, _, z]| {
+            let [x, y, _] = transform.machine_from_gcode([x, y, z]);
+            [x, y, z + most]
+        })
+    })
+}
+
 /// See the module.
 #[derive(Clone, Debug)]
 pub(crate) struct Skip {
@@ -33,7 +45,7 @@ pub(crate) struct Skip {
     /// What heaters and fan are to do at that line.
     pub(crate) targets: Vec<(Heater, Celsius)>,
     pub(crate) fan: f64,
-    /// The highest Z at which anything has been extruded, in mm …
+    /// The highest Z at which anything has been extruded, in mm of the machine …
     pub(crate) top: f64,
     /// … and the lowest and highest X and Y.
     pub(crate) printed: Option<[[f64; 2]; 2]>,
@@ -80,6 +92,7 @@ impl Skip {
                 }
                 None => {
                     let Position { x, y, z, e } = source.interpreter.position();
+                    let [x, y, z] = planner.transform().machine_from_gcode([x, y, z]);
                     planner.stand_at([x, y, z, 0.0]);
                     (0..3).for_each(|axis| planner.guard.set_homed(axis, true));
                     source.e_offset = planner.position()[EXTRUDER] - e;
@@ -92,9 +105,9 @@ impl Skip {
     }
 
     /// Something has been extruded on the way between these ends, up to so much filament.
-    fn print(&mut self, ends: [[f64; 3]; 2], filament: f64) {
+    fn print(&mut self, ends: [[f64; 3]; 2], filament: f64, transform: &Transform) {
         self.filament_max = self.filament_max.max(filament);
-        for [x, y, z] in ends {
+        for [x, y, z] in corners(ends, transform) {
             self.top = self.top.max(z);
             let [[low_x, low_y], [high_x, high_y]] = self.printed.unwrap_or([[x, y]; 2]);
             self.printed = Some([[low_x.min(x), low_y.min(y)], [high_x.max(x), high_y.max(y)]]);
@@ -109,10 +122,15 @@ impl Skip {
     ) -> Result<(), PrinterError> {
         match *action {
             Action::Move(mv) if mv.to.e > mv.from.e => {
-                let [from, to] = [mv.from, mv.to].map(|at| [at.x, at.y, at.z]);
-                self.print([from, to], mv.to.e);
+                let ends = [mv.from, mv.to].map(|at| [at.x, at.y, at.z]);
+                self.print(ends, mv.to.e, planner.transform());
             }
-            Action::Arc(ref arc) if arc.to.e > arc.from.e => self.print(arc.bounds(), arc.to.e),
+            Action::Arc(ref arc) if arc.to.e > arc.from.e => {
+                self.print(arc.bounds(), arc.to.e, planner.transform());
+            }
+            Action::Skew(_) | Action::BedMesh(_) => {
+                planner.set_transform(action, source.line())?;
+            }
             Action::SetTemperature { heater, target, .. } => {
                 self.targets.retain(|(known, _)| *known != heater);
                 self.targets.push((heater, target));
@@ -122,8 +140,9 @@ impl Skip {
             Action::VelocityLimit(limit) => planner.limit(limit),
             Action::PressureAdvance { .. } | Action::InputShaper(_) => planner.set_dynamics(action),
             Action::Home { x, y, z } => {
-                let home = |axis: usize, is: bool| is.then_some(self.endstops[axis]);
-                source.interpreter.set_axes(home(0, x), home(1, y), home(2, z));
+                let axes = planner.homed_together([x, y, z]);
+                let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.endstops[axis]));
+                source.interpreter.set_axes(x, y, z);
             }
             Action::Cancel | Action::EmergencyStop => {
                 let detail = format!("the file ends the print before line {}", self.until.0);

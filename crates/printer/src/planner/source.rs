@@ -1,11 +1,12 @@
 //! One stream of G-code with its own modal state: a job's file, or what a user types.
 
 use gcode::{
-    Action, Arc, CHORD_TOLERANCE, Chords, Diagnostic, Interpreter, LineNumber, Lines, Move, Settings,
+    Action, Arc, ArcPiece, CHORD_TOLERANCE, Chords, Diagnostic, Interpreter, LineNumber, Lines, Settings,
 };
 use units::{Mm, MmPerS};
 
-use crate::pace::Pace;
+use super::Position;
+use crate::{pace::Pace, transform::Pieces};
 
 /// The most bytes a source holds before it says that it wants no more.
 pub const SOURCE_BYTES_MAX: usize = 64 * 1024;
@@ -21,8 +22,10 @@ pub struct Source {
     actions: Vec<Action>,
     next_action: usize,
     diagnostics: Vec<Diagnostic>,
-    /// The chords of an arc that is being drawn, one at a time: a large arc has tens of thousands.
+    /// The pieces of an arc that is being drawn, one at a time: a large arc has tens of thousands.
     chords: Option<Chords>,
+    /// What is left of a move that the machine makes in pieces.
+    pieces: Option<Box<Piecewise>>,
     /// The toolhead's extruder position less the interpreter's, which counts from its own start, in mm of filament.
     pub(super) e_offset: f64,
     line: LineNumber,
@@ -30,6 +33,23 @@ pub struct Source {
     pace: Pace,
     /// As the user set it last.
     wanted: Pace,
+}
+
+/// A move of the G-code in pieces.
+#[derive(Debug)]
+struct Piecewise {
+    pieces: Pieces,
+    feed: MmPerS,
+    line: LineNumber,
+}
+
+/// One of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    /// Where it ends, in machine coordinates.
+    pub(super) to: Position,
+    pub(super) feed: MmPerS,
+    pub(super) line: LineNumber,
 }
 
 /// What a source has next.
@@ -59,6 +79,7 @@ impl Source {
             next_action: 0,
             diagnostics: Vec::new(),
             chords: None,
+            pieces: None,
             e_offset: 0.0,
             line: LineNumber(0),
             pace: Pace::default(),
@@ -102,7 +123,10 @@ impl Source {
 
     /// Whether everything that was fed has been read.
     pub fn is_drained(&self) -> bool {
-        self.lines.buffered() == 0 && self.next_action >= self.actions.len() && self.chords.is_none()
+        self.lines.buffered() == 0
+            && self.next_action >= self.actions.len()
+            && self.chords.is_none()
+            && self.pieces.is_none()
     }
 
     /// Says that no more bytes come: a last line without a line break counts.
@@ -140,6 +164,27 @@ impl Source {
         self.next_action = 0;
         self.diagnostics.clear();
         self.chords = None;
+        self.pieces = None;
+    }
+
+    /// Begins to make a move in pieces.
+    pub(super) fn take_apart(&mut self, pieces: Pieces, feed: MmPerS, line: LineNumber) {
+        self.pieces = Some(Box::new(Piecewise { pieces, feed, line }));
+    }
+
+    /// What is left of the move that is being made is not made.
+    pub(super) fn drop_pieces(&mut self) {
+        self.pieces = None;
+    }
+
+    /// The next piece of it.
+    pub(super) fn next_piece(&mut self) -> Option<Piece> {
+        let Piecewise { pieces, feed, line } = self.pieces.as_deref_mut()?;
+        let piece = pieces.next().map(|to| Piece { to, feed: *feed, line: *line });
+        if piece.is_none() {
+            self.pieces = None;
+        }
+        piece
     }
 
     /// Begins to draw an arc.
@@ -148,12 +193,12 @@ impl Source {
     }
 
     /// The next piece of the arc that is being drawn.
-    pub(super) fn next_chord(&mut self) -> Option<Move> {
-        let chord = self.chords.as_mut()?.next();
-        if chord.is_none() {
+    pub(super) fn next_arc_piece(&mut self) -> Option<ArcPiece> {
+        let piece = self.chords.as_mut()?.next_piece();
+        if piece.is_none() {
             self.chords = None;
         }
-        chord
+        piece
     }
 
     /// The next thing in the stream.

@@ -24,13 +24,13 @@ pub(super) fn planner() -> (Planner, Source) {
     (planner, source)
 }
 
-fn feed(source: &mut Source, text: &str) {
+pub(super) fn feed(source: &mut Source, text: &str) {
     source.feed(text.as_bytes());
     source.end();
 }
 
 /// Everything but steps, up to the end or the first error.
-fn items(planner: &mut Planner, source: &mut Source) -> Vec<Planned> {
+pub(super) fn items(planner: &mut Planner, source: &mut Source) -> Vec<Planned> {
     let mut items = Vec::new();
     loop {
         match planner.next(source).unwrap() {
@@ -44,13 +44,13 @@ fn items(planner: &mut Planner, source: &mut Source) -> Vec<Planned> {
     }
 }
 
-fn plan(text: &str) -> Vec<Planned> {
+pub(super) fn plan(text: &str) -> Vec<Planned> {
     let (mut planner, mut source) = planner();
     feed(&mut source, text);
     items(&mut planner, &mut source)
 }
 
-fn moves(items: &[Planned]) -> Vec<PlannedMove> {
+pub(super) fn moves(items: &[Planned]) -> Vec<PlannedMove> {
     items
         .iter()
         .filter_map(|item| if let Planned::Move(mv, _) = item { Some(mv.clone()) } else { None })

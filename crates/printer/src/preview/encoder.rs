@@ -7,7 +7,9 @@ use gcode::{Annotation, Move};
 
 use super::layers::Layers;
 use super::objects::Objects;
-use super::vertex::{FEATURES, Flags, Grid, Vertex, feature_number, height_units, width_units};
+use super::vertex::{
+    FEATURE_UNNAMED, FEATURES, Flags, Grid, Vertex, feature_number, height_units, width_units,
+};
 
 /// The most vertices of a file: 4 GiB of them.
 pub const VERTICES_MAX: u32 = 1 << 28;
@@ -21,8 +23,6 @@ const SAME_PLACE_MM: f64 = 1e-6;
 const LOOP_SEGMENTS_MIN: u32 = 3;
 /// A loop's ends are this near each other where its width is not known.
 const LOOP_GAP_MM: f64 = 0.5;
-/// The feature before a file names one.
-const FEATURE_UNNAMED: u8 = 16;
 const OUTER_WALL: u8 = 1;
 const OVERHANG_WALL: u8 = 2;
 
@@ -77,6 +77,11 @@ pub(super) struct Encoder {
 
 const fn place(position: gcode::Position) -> [f64; 3] {
     [position.x, position.y, position.z]
+}
+
+/// Whether a move leads nowhere.
+pub(super) fn is_on_the_spot(mv: &Move) -> bool {
+    distance(place(mv.from), place(mv.to)) < SAME_PLACE_MM
 }
 
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {

@@ -5,25 +5,47 @@
 
 use std::collections::VecDeque;
 
-use gcode::{Action, LineNumber, Move, Wait};
-use motion::{Limits, LookAhead, MoveRequest, PlannedMove};
-use units::Seconds;
+use gcode::{Action, Heater, LineNumber, Move, Wait};
+use motion::{Bend, Limits, LookAhead, MoveRequest, PlannedMove};
+use units::{Celsius, Seconds};
 
+use super::channels::{Asked, Channels, Scene};
 use super::encoder::Segment;
 use super::vertex::FEATURES;
-use crate::{config::PrinterConfig, error::PrinterError, machine, planner::PLAN_CLOCK, step_rate::StepRates};
+use crate::{
+    config::PrinterConfig,
+    error::PrinterError,
+    machine,
+    planner::{MoveEstimate, MoveKind, PLAN_CLOCK},
+    step_rate::StepRates,
+};
 
 /// What a planned move is counted under: 5 bits of the tag are the feature, the rest is the layer.
 const TRAVEL_TAG: u32 = 31;
 const TAG_BITS: u32 = 5;
+
+/// A move of the file, and what the onlooker has made of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asking<'a> {
+    pub(super) mv: &'a Move,
+    pub(super) bend: Option<&'a Bend>,
+    pub(super) segment: Segment,
+    pub(super) layer: u32,
+    /// The vertex at which it ends.
+    pub(super) vertex: Option<u32>,
+}
 
 /// Adds up the time of moves.
 #[derive(Debug)]
 pub(super) struct Estimate {
     machine: Limits,
     look_ahead: LookAhead,
-    /// The lines of the moves in the look-ahead.
-    lines: VecDeque<LineNumber>,
+    /// The moves in the look-ahead, with their lines.
+    asked: VecDeque<(LineNumber, Asked)>,
+    /// Where somebody wants them.
+    pub(super) channels: Option<Channels>,
+    scene: Scene,
+    filament_area_mm2: f64,
     step_rates: StepRates,
     /// The first move that is found to be too fast for its motors, until it is taken.
     pub(super) too_fast: Option<PrinterError>,
@@ -41,7 +63,10 @@ impl Estimate {
         Some(Self {
             machine: limits,
             look_ahead: LookAhead::with_profile(limits, machine::profile(config)).ok()?,
-            lines: VecDeque::new(),
+            asked: VecDeque::new(),
+            channels: None,
+            scene: Scene::default(),
+            filament_area_mm2: machine::filament_area_mm2(config),
             step_rates: StepRates::new(config, PLAN_CLOCK),
             too_fast: None,
             running: false,
@@ -52,7 +77,8 @@ impl Estimate {
         })
     }
 
-    pub(super) fn mv(&mut self, mv: &Move, segment: Segment, layer: u32) {
+    pub(super) fn mv(&mut self, asking: &Asking<'_>) {
+        let Asking { mv, bend, segment, layer, vertex } = *asking;
         let (from, to) = (mv.from.to_array(), mv.to.to_array());
         if from == to {
             return;
@@ -67,19 +93,25 @@ impl Estimate {
         };
         let request = MoveRequest { from, to, feed: mv.feed, tag: layer << TAG_BITS | feature };
         let before = self.look_ahead.len();
-        if self.look_ahead.push(&request).is_err() {
+        if self.look_ahead.push_along(&request, bend.filter(|bend| bend.fits(&from, &to))).is_err() {
             self.failed = true;
             self.look_ahead.begin_run();
-            self.lines.clear();
+            self.asked.clear();
         } else if self.look_ahead.len() > before {
             // One without length is dropped.
-            self.lines.push_back(mv.line);
+            self.asked.push_back((mv.line, Asked { vertex, feed: mv.feed, scene: self.scene }));
         }
         self.take();
     }
 
     /// What is not a move: some of it needs the machine at rest.
     pub(super) fn act(&mut self, action: &Action) {
+        match action {
+            Action::SetTemperature { heater: Heater::Tool(_), target, .. } => self.scene.nozzle = *target,
+            Action::TurnOffHeaters => self.scene.nozzle = Celsius::ZERO,
+            Action::Fan { index: 0, speed } => self.scene.fan = *speed,
+            _ => {}
+        }
         match action {
             Action::Dwell(pause) if self.running => {
                 self.look_ahead.dwell(*pause);
@@ -104,7 +136,7 @@ impl Estimate {
         }
     }
 
-    fn end_run(&mut self) {
+    pub(super) fn end_run(&mut self) {
         if self.running {
             self.look_ahead.flush();
             self.take();
@@ -130,9 +162,14 @@ impl Estimate {
     }
 
     fn judge(&mut self, planned: &PlannedMove) {
-        let line = self.lines.pop_front().unwrap_or_default();
+        let Some((line, asked)) = self.asked.pop_front() else { return };
         if let Err(error) = self.step_rates.judge_planned(planned) {
             self.too_fast.get_or_insert(error.at_line(line.0));
+        }
+        if let Some(channels) = &mut self.channels {
+            // Kind and layer are the vertex' own.
+            let estimate = MoveEstimate::new(planned, MoveKind::Travel, 0, self.filament_area_mm2);
+            channels.push(&asked, &estimate);
         }
     }
 

@@ -119,7 +119,7 @@ impl Layers {
     }
 
     /// All of them.
-    pub(super) fn list(&self) -> &[Layer] {
+    pub(crate) fn list(&self) -> &[Layer] {
         &self.list
     }
 }

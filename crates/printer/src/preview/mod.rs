@@ -4,6 +4,7 @@
 //! [`Preview::wants`] bytes at a time and makes at most [`RUN_WORDS_MAX`] words at a time, however much an arc unfolds to.
 //! Knows no screen and no session, and never touches a running print. Positions in mm, times in seconds.
 
+mod channels;
 mod encoder;
 mod estimate;
 #[cfg(test)]
@@ -20,19 +21,23 @@ pub mod vertex;
 use std::collections::VecDeque;
 
 use gcode::{Action, Annotation, CHORD_TOLERANCE, Chords, LineNumber, Move, PauseReason};
+use motion::Bend;
 use units::{Mm, Seconds};
 
 use self::{
+    channels::Channels,
     encoder::Encoder,
-    estimate::Estimate,
+    estimate::{Asking, Estimate},
     pictures::Pictures,
     vertex::{FEATURES, Flags, Grid, WORDS},
 };
 use crate::{
+    arcs,
     check::{CheckReport, Checker},
     config::PrinterConfig,
 };
 
+pub use channels::CHANNEL_WORDS;
 pub use encoder::VERTICES_MAX;
 pub use layers::LAYERS_MAX;
 pub use objects::{OBJECTS_MAX, ObjectReport};
@@ -183,8 +188,8 @@ impl Preview {
             if out.len() >= enough {
                 return true;
             }
-            if let Some(chord) = self.arc.as_mut().and_then(Iterator::next) {
-                self.mv(&chord, out);
+            if let Some(piece) = self.arc.as_mut().and_then(Chords::next_piece) {
+                self.mv(&piece.chord, Some(&arcs::bend(&piece)), out);
                 continue;
             }
             self.arc = None;
@@ -218,7 +223,7 @@ impl Preview {
             self.checker.add(estimate.too_fast.take());
         }
         match action {
-            Action::Move(mv) => self.mv(&mv, out),
+            Action::Move(mv) => self.mv(&mv, None, out),
             Action::Arc(arc) => self.arc = Some(arc.chords(CHORD_TOLERANCE)),
             Action::Home { .. } => self.encoder.lose_way(),
             Action::SelectTool(tool) => self.encoder.select_tool(tool),
@@ -235,12 +240,34 @@ impl Preview {
         }
     }
 
-    fn mv(&mut self, mv: &Move, out: &mut Vec<u32>) {
+    fn mv(&mut self, mv: &Move, bend: Option<&Bend>, out: &mut Vec<u32>) {
+        let before = self.encoder.count;
         let segment = self.encoder.mv(mv, out);
+        // The last of the vertices that it has made is its end; on the spot it makes none of its own.
+        let has_end = self.encoder.count > before && !encoder::is_on_the_spot(mv);
+        let vertex = has_end.then(|| self.encoder.count - 1);
         if let Some(estimate) = &mut self.estimate {
-            estimate.mv(mv, segment, self.encoder.layers.number());
+            estimate.mv(&Asking { mv, bend, segment, layer: self.encoder.layers.number(), vertex });
             self.checker.add(estimate.too_fast.take());
         }
+    }
+
+    /// Asks for the [planner channels](`Self::take_channels`), before the first byte. Without a machine there are none.
+    pub fn want_channels(&mut self) {
+        if let Some(estimate) = &mut self.estimate {
+            estimate.channels = Some(Channels::default());
+        }
+    }
+
+    /// What the planner knows of the vertices that it has planned since the last call: [`CHANNEL_WORDS`] for each, in their order
+    /// (`docs/vertex.md`). Once [`Self::run`] has come to the file's end, the last of them.
+    pub fn take_channels(&mut self) -> Vec<u32> {
+        let Some(estimate) = &mut self.estimate else { return Vec::new() };
+        if self.finished && self.actions.is_empty() && self.arc.is_none() {
+            estimate.end_run();
+            estimate.channels.iter_mut().for_each(|channels| channels.fill(self.encoder.count));
+        }
+        estimate.channels.as_mut().map(Channels::take).unwrap_or_default()
     }
 
     /// Pairs of a line of the file and the vertex where its segment ends, one for some dozens of vertices, in order:

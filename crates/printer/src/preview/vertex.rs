@@ -22,6 +22,8 @@ const FEATURE_MASK: u32 = 31;
 const TOOL_SHIFT: u32 = 20;
 const OBJECT_SHIFT: u32 = 24;
 const EVENT_SHIFT: u32 = 29;
+/// The feature before a file names one.
+pub const FEATURE_UNNAMED: u8 = 16;
 /// How many features have a number.
 pub const FEATURES: usize = 17;
 

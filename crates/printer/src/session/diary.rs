@@ -95,6 +95,7 @@ impl Diary {
             machine: machine_check(config),
             clock: planner.clock().0,
             position: planner.position(),
+            transform: planner.transform().record(),
             homed: planner.guard.homed(),
             confirmed: options.confirmed_lines.clone(),
             confirm_all: options.confirm_all,

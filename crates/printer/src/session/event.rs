@@ -6,7 +6,7 @@ use gcode::{Annotation, Diagnostic, Heater, ObjectAction};
 use motion::PlannedMove;
 use units::{Celsius, Mm, MmPerS, Seconds, Ticks};
 
-use crate::{error::PrinterError, planner::Position};
+use crate::{error::PrinterError, machine::MOTORS, planner::Position};
 
 /// The most events that wait for their owner. Beyond that the oldest of those that come in masses (readings, moves,
 /// progress, comments) are dropped first, and the owner is told how many.
@@ -116,8 +116,9 @@ pub enum Event {
         axis: usize,
         /// Where it is, in mm.
         position_mm: f64,
-        /// How many steps of the homing move were made, both approaches together.
-        steps: u64,
+        /// How many steps of the homing move each motor made, both approaches together; of a delta's towers, the one of
+        /// that number.
+        steps: [u64; MOTORS],
     },
     /// The job passed this line.
     Progress {

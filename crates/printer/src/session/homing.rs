@@ -1,17 +1,25 @@
 //! Homing: an axis runs towards its endstop until the board itself sees it and stops the motor, backs off, and does it
-//! again more slowly. The position comes from where the motor stopped, never from the plan.
+//! again more slowly. The position comes from where the motor stopped, never from the plan. Motors that move an axis together
+//! stop together; a delta's towers run upwards together, and each stops at its own endstop.
 //!
 //! The board's trigger fires by itself when the host falls silent, so a lost link stops the axis. Where that was but a
 //! bad moment of the line, the axis goes on from where it stands, a few times: no further altogether than one approach goes.
 
+use steps::Geometry;
 use units::{Seconds, Ticks};
 use wire::Command;
 
-use super::{board::Board, layout::EndstopOids};
+use super::board::Board;
 use crate::{
-    config::StepperConfig,
+    config::PrinterConfig,
     error::{ErrorCode, PrinterError},
+    machine::{self, MOTORS},
+    reach::AXES,
 };
+pub(super) use parts::{HomingMove, Wish};
+use parts::{Mover, Stage, Stop};
+
+mod parts;
 
 /// The reasons with which a trigger may fire.
 const REASON_ENDSTOP: u8 = 1;
@@ -46,126 +54,87 @@ const APART_MAX: Seconds = Seconds(2.0);
 /// Why the board stopped an axis by itself.
 const NOT_HEARD: &str = "the board heard nothing from the host";
 
-/// A straight move that homing wants made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct HomingMove {
-    /// Where the axis is taken to be, in mm.
-    pub(super) from_mm: f64,
-    /// Where it goes, in mm.
-    pub(super) to_mm: f64,
-    /// How fast, in mm/s.
-    pub(super) speed: units::MmPerS,
-}
-
-/// What homing wants next.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Wish {
-    /// Nothing but time.
-    Wait,
-    /// Plan this move and make a run of it; then call [`AxisHoming::run_started`].
-    Move(HomingMove),
-    /// The motor has been stopped by the trigger: forget what was planned.
-    Abandon,
-    /// The board stopped the motor because it had heard nothing; it now goes on. The user should know of it.
-    GoesOn,
-    /// The axis is home.
-    Done,
-    /// The axis stands still because it was told to; where, nobody knows.
-    Cancelled,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Stage {
-    /// Ask where the motor stands.
-    PositionBefore,
-    /// Have the approach planned.
-    Plan,
-    /// On the way; `end` is when the move would end without an endstop.
-    Approach {
-        start: Ticks,
-        end: Option<Ticks>,
-        kept_alive: Seconds,
-        heard: Seconds,
-    },
-    /// The trigger has fired: ask where the motor stopped.
-    PositionAfter,
-    /// Have the way back planned.
-    PlanRetract,
-    /// On the way back.
-    Retract,
-    /// Ask whether the endstop has been let go.
-    Released,
-    Done,
-}
-
-/// One axis on its way home.
+/// One axis on its way home, or all those that are homed together.
 #[derive(Debug)]
 pub(super) struct AxisHoming {
     pub(super) axis: usize,
-    oids: EndstopOids,
-    stepper: u8,
+    /// Those whose position is known once it is home, and where they are then, in mm.
+    pub(super) axes: [bool; 3],
+    pub(super) home_mm: [f64; 3],
+    stops: Vec<Stop>,
+    movers: Vec<Mover>,
+    geometry: Geometry,
     stage: Stage,
     second: bool,
     cancelled: bool,
     /// When the question of the present stage was first and last asked.
     asked: Option<(Seconds, Seconds)>,
-    position_before: i32,
     abandon: bool,
     /// The board stopped the approach because it heard nothing; to be told once it goes on.
     expired: bool,
     goes_on: bool,
     /// Host and board have been apart for long in the present approach.
     apart: bool,
-    /// How often the present approach has been begun, and the steps that it has made.
+    /// How often the present approach has been begun.
     tries: u8,
-    approach_steps: u64,
-    /// Steps made in both approaches, as the board counted them.
-    pub(super) steps: u64,
-    endstop_mm: f64,
     retract_mm: f64,
     travel_mm: f64,
     /// +1 where the endstop is at the high end.
     sign: f64,
     speeds: [units::MmPerS; 2],
-    step_mm: f64,
 }
 
 impl AxisHoming {
-    pub(super) fn new(axis: usize, config: &StepperConfig, board: &Board) -> Option<Self> {
+    pub(super) fn new(axis: usize, config: &PrinterConfig, board: &Board) -> Option<Self> {
+        let axes = machine::homed_together(config, core::array::from_fn(|it| it == axis));
+        // Towers that are homed together all move as Z does.
+        let axis = if axes == [true; 3] { 2 } else { axis };
+        let (stops, movers) = parts::parts(axis, config, board)?;
+        let stepper = &config.steppers[axis];
         Some(Self {
             axis,
-            oids: board.layout.endstops[axis],
-            stepper: board.layout.steppers[axis]?.stepper.0,
+            axes,
+            home_mm: config.steppers.each_ref().map(|stepper| stepper.position_endstop.0),
+            stops,
+            movers,
+            geometry: machine::geometry(config),
             stage: Stage::PositionBefore,
             second: false,
             cancelled: false,
             asked: None,
-            position_before: 0,
             abandon: false,
             expired: false,
             goes_on: false,
             apart: false,
             tries: 0,
-            approach_steps: 0,
-            steps: 0,
-            endstop_mm: config.position_endstop.0,
-            retract_mm: config.homing_retract_dist.0,
-            travel_mm: TRAVEL_FACTOR * (config.position_max - config.position_min).0,
-            sign: if config.homing_positive_dir { 1.0 } else { -1.0 },
-            speeds: [config.homing_speed, config.second_homing_speed],
-            step_mm: config.motor.step_distance().0,
+            retract_mm: stepper.homing_retract_dist.0,
+            travel_mm: TRAVEL_FACTOR * parts::length_mm(axis, config),
+            sign: if stepper.homing_positive_dir { 1.0 } else { -1.0 },
+            speeds: [stepper.homing_speed, stepper.second_homing_speed],
         })
     }
 
     /// Where the axis is once it is home, in mm.
     pub(super) const fn position_mm(&self) -> f64 {
-        self.endstop_mm
+        self.home_mm[self.axis]
+    }
+
+    /// Steps that each motor has made in both approaches, as the board counted them.
+    pub(super) fn steps(&self) -> [u64; MOTORS] {
+        let of = |motor: usize| self.movers.iter().find(|mover| mover.motor == motor);
+        core::array::from_fn(|motor| of(motor).map_or(0, |mover| mover.steps))
+    }
+
+    /// The shortest step of any motor that moves.
+    fn step_mm(&self) -> f64 {
+        self.movers.iter().map(|mover| mover.step_mm).fold(f64::INFINITY, f64::min)
     }
 
     /// How far the present approach may still go, in mm: however often it is begun, no further than one approach goes.
     fn travel_left_mm(&self) -> f64 {
         let travel = if self.second { SECOND_TRAVEL_FACTOR * self.retract_mm } else { self.travel_mm };
-        travel - self.approach_steps as f64 * self.step_mm
+        let made = self.movers.iter().map(|mover| mover.approach_steps as f64 * mover.step_mm);
+        travel - made.fold(0.0, f64::max)
     }
 
     /// The axis is to stop.
@@ -177,18 +146,24 @@ impl AxisHoming {
     fn enter(&mut self, stage: Stage) {
         self.stage = stage;
         self.asked = None;
+        self.movers.iter_mut().for_each(|mover| mover.has_answered = false);
     }
 
     fn fail(&self, code: ErrorCode, detail: &str) -> PrinterError {
-        let axis = ["X", "Y", "Z"][self.axis];
+        let axis = if self.axes == [true; 3] { "the towers" } else { AXES[self.axis] };
         PrinterError::new(code, if detail.is_empty() { axis.to_owned() } else { format!("{axis}, {detail}") })
     }
 
     /// Asks, and asks again; fails when nobody answers.
-    fn ask(&mut self, question: &Command<'_>, board: &mut Board, now: Seconds) -> Result<(), PrinterError> {
+    fn ask(
+        &mut self,
+        questions: impl IntoIterator<Item = Command<'static>>,
+        board: &mut Board,
+        now: Seconds,
+    ) -> Result<(), PrinterError> {
         let (first, last) = self.asked.unwrap_or((now, now));
         if self.asked.is_none() || now - last >= ASK_AGAIN {
-            board.control(question);
+            questions.into_iter().for_each(|question| board.control(&question));
             self.asked = Some((first, now));
         }
         if now - first > ANSWER_MAX {
@@ -215,18 +190,22 @@ impl AxisHoming {
         }
         match self.stage {
             Stage::PositionBefore | Stage::PositionAfter => {
-                self.ask(&Command::StepperGetPosition { oid: self.stepper }, board, now)?;
+                let unknown = self.movers.iter().filter(|mover| !mover.has_answered);
+                let questions: Vec<_> =
+                    unknown.map(|mover| Command::StepperGetPosition { oid: mover.oid }).collect();
+                self.ask(questions, board, now)?;
                 Ok(Wish::Wait)
             }
             Stage::Plan => {
-                let from_mm = self.endstop_mm - self.sign * self.travel_left_mm();
+                let from_mm = self.position_mm() - self.sign * self.travel_left_mm();
                 let speed = self.speeds[usize::from(self.second)];
-                Ok(Wish::Move(HomingMove { from_mm, to_mm: self.endstop_mm, speed }))
+                Ok(Wish::Move(HomingMove { from_mm, to_mm: self.position_mm(), speed }))
             }
             Stage::Approach { .. } => self.watch(board, now),
             Stage::PlanRetract => {
-                let to_mm = self.endstop_mm - self.sign * self.retract_mm;
-                Ok(Wish::Move(HomingMove { from_mm: self.endstop_mm, to_mm, speed: self.speeds[0] }))
+                let to_mm = self.position_mm() - self.sign * self.retract_mm;
+                let from_mm = self.position_mm();
+                Ok(Wish::Move(HomingMove { from_mm, to_mm, speed: self.speeds[0] }))
             }
             Stage::Retract => {
                 if at_rest {
@@ -235,7 +214,17 @@ impl AxisHoming {
                 Ok(Wish::Wait)
             }
             Stage::Released => {
-                self.ask(&Command::EndstopQueryState { oid: self.oids.endstop.0 }, board, now)?;
+                let closed = self.stops.iter().filter(|stop| !stop.is_released);
+                let questions: Vec<_> =
+                    closed.map(|stop| Command::EndstopQueryState { oid: stop.oids.endstop.0 }).collect();
+                self.ask(questions, board, now)?;
+                Ok(Wish::Wait)
+            }
+            Stage::PlanStraight(by) => Ok(Wish::Straighten(by)),
+            Stage::Straight => {
+                if at_rest {
+                    self.enter(Stage::Done);
+                }
                 Ok(Wish::Wait)
             }
             Stage::Done => Ok(Wish::Done),
@@ -247,44 +236,64 @@ impl AxisHoming {
         match self.stage {
             Stage::PositionBefore | Stage::PositionAfter | Stage::Released => true,
             // Its move may be on the way to the stream.
-            Stage::Plan | Stage::PlanRetract | Stage::Retract => at_rest,
+            Stage::Plan | Stage::PlanRetract | Stage::Retract | Stage::PlanStraight(_) | Stage::Straight => {
+                at_rest
+            }
             Stage::Approach { .. } | Stage::Done => false,
         }
     }
 
     /// Its move has become a run that starts at this clock: the trigger is armed before the first step.
     pub(super) fn run_started(&mut self, start: Ticks, board: &mut Board, now: Seconds) {
-        if self.stage == Stage::PlanRetract {
-            self.enter(Stage::Retract);
-            return;
+        match self.stage {
+            Stage::PlanRetract => return self.enter(Stage::Retract),
+            Stage::PlanStraight(_) => return self.enter(Stage::Straight),
+            _ => {}
         }
-        let (trsync, clock) = (self.oids.trsync.0, start.low().0);
-        let speed = self.speeds[usize::from(self.second)];
+        // Between steps there is nothing new to see.
+        let rest = Seconds(self.step_mm() / self.speeds[usize::from(self.second)].0);
+        for index in 0..self.stops.len() {
+            self.stops[index] =
+                Stop { has_fired: false, heard: now, is_released: false, ..self.stops[index] };
+            self.arm(index, start, rest, board);
+        }
+        self.tries += 1;
+        self.apart = false;
+        self.enter(Stage::Approach { start, end: None, kept_alive: now });
+    }
+
+    /// Arms a switch: its motors stop when it closes.
+    fn arm(&self, stop: usize, start: Ticks, rest: Seconds, board: &mut Board) {
+        let oids = self.stops[stop].oids;
+        let (trsync, clock) = (oids.trsync.0, start.low().0);
         board.control(&Command::TrsyncStart {
             oid: trsync,
             report_clock: clock,
             report_ticks: board.ticks(REPORT).0 as u32,
             expire_reason: REASON_EXPIRED,
         });
-        board.control(&Command::StepperStopOnTrigger { oid: self.stepper, trsync_oid: trsync });
+        for mover in self.movers.iter().filter(|mover| mover.stop == stop) {
+            board.control(&Command::StepperStopOnTrigger { oid: mover.oid, trsync_oid: trsync });
+        }
         board.control(&Command::TrsyncSetTimeout {
             oid: trsync,
             clock: (start + board.ticks(EXPIRE)).low().0,
         });
         board.control(&Command::EndstopHome {
-            oid: self.oids.endstop.0,
+            oid: oids.endstop.0,
             clock,
             sample_ticks: board.ticks(SAMPLE).0 as u32,
             sample_count: SAMPLES,
-            // Between steps there is nothing new to see.
-            rest_ticks: board.ticks(Seconds(self.step_mm / speed.0)).0 as u32,
-            pin_value: u8::from(!self.oids.inverted),
+            rest_ticks: board.ticks(rest).0 as u32,
+            pin_value: u8::from(!oids.inverted),
             trsync_oid: trsync,
             trigger_reason: REASON_ENDSTOP,
         });
-        self.tries += 1;
-        self.apart = false;
-        self.enter(Stage::Approach { start, end: None, kept_alive: now, heard: now });
+    }
+
+    /// Nothing has to be moved back.
+    pub(super) fn is_straight(&mut self) {
+        self.enter(Stage::Done);
     }
 
     /// The approach has been planned to its end.
@@ -294,39 +303,48 @@ impl AxisHoming {
         }
     }
 
+    /// The switches that have not closed yet.
+    fn armed(&self) -> impl Iterator<Item = &Stop> {
+        self.stops.iter().filter(|stop| !stop.has_fired)
+    }
+
     /// Where they were apart for too long, an approach that the board has stopped does not go on.
     fn note_apart(&mut self, now: Seconds) {
-        if let Stage::Approach { kept_alive, heard, .. } = self.stage {
-            self.apart |= now - kept_alive > APART_MAX || now - heard > APART_MAX;
+        if let Stage::Approach { kept_alive, .. } = self.stage {
+            let silent = self.armed().any(|stop| now - stop.heard > APART_MAX);
+            self.apart |= now - kept_alive > APART_MAX || silent;
         }
     }
 
     fn watch(&mut self, board: &mut Board, now: Seconds) -> Result<Wish, PrinterError> {
         self.note_apart(now);
-        let Stage::Approach { start, end, kept_alive, heard } = &mut self.stage else {
+        let Stage::Approach { start, end, kept_alive } = &mut self.stage else {
             return Ok(Wish::Wait);
         };
         let clock_now = board.clock_at(now);
+        let (start, end) = (*start, *end);
         if now - *kept_alive >= KEEP_ALIVE {
             *kept_alive = now;
             // Never before the axis moves: a stepper that is stopped first would start all the same.
-            let clock = (clock_now.max(*start) + board.ticks(EXPIRE)).low().0;
-            board.control(&Command::TrsyncSetTimeout { oid: self.oids.trsync.0, clock });
+            let clock = (clock_now.max(start) + board.ticks(EXPIRE)).low().0;
+            for stop in self.armed() {
+                board.control(&Command::TrsyncSetTimeout { oid: stop.oids.trsync.0, clock });
+            }
         }
         let overdue = end.is_some_and(|end| clock_now > end + board.ticks(REPORT));
-        let silent = now - *heard > REPORT_SILENCE;
         // Not before the steps have begun: a stepper that is stopped first would start with them all the same.
-        let stop_wanted = self.cancelled && clock_now > *start + board.ticks(REPORT);
-        let overdue = overdue || stop_wanted;
-        if overdue || silent {
+        let stop_wanted = self.cancelled && clock_now > start + board.ticks(REPORT);
+        if overdue || stop_wanted {
             // Answered with the reason that it fired for first, should it have fired already.
-            let stop = Command::TrsyncTrigger { oid: self.oids.trsync.0, reason: REASON_HOST };
-            if overdue {
-                self.ask(&stop, board, now)?;
-            } else {
-                // Its answer says whether the approach is still on, without ending it.
-                self.ask(&Command::EndstopQueryState { oid: self.oids.endstop.0 }, board, now)?;
-            }
+            let stop = |stop: &Stop| Command::TrsyncTrigger { oid: stop.oids.trsync.0, reason: REASON_HOST };
+            let questions: Vec<_> = self.armed().map(stop).collect();
+            self.ask(questions, board, now)?;
+        } else if self.armed().any(|stop| now - stop.heard > REPORT_SILENCE) {
+            // Its answer says whether the approach is still on, without ending it.
+            let silent = self.armed().filter(|stop| now - stop.heard > REPORT_SILENCE);
+            let questions: Vec<_> =
+                silent.map(|stop| Command::EndstopQueryState { oid: stop.oids.endstop.0 }).collect();
+            self.ask(questions, board, now)?;
         }
         Ok(Wish::Wait)
     }
@@ -341,65 +359,47 @@ impl AxisHoming {
         board: &mut Board,
     ) -> Result<(), PrinterError> {
         self.note_apart(now);
-        let Stage::Approach { heard, .. } = &mut self.stage else { return Ok(()) };
-        if oid != self.oids.trsync.0 {
+        if !matches!(self.stage, Stage::Approach { .. }) {
+            return Ok(());
+        }
+        let Some(stop) = self.stops.iter_mut().find(|stop| stop.oids.trsync.0 == oid) else { return Ok(()) };
+        if stop.has_fired {
             return Ok(());
         }
         if can_trigger {
-            *heard = now;
+            stop.heard = now;
             self.asked = self.asked.filter(|_| self.cancelled);
             return Ok(());
         }
         match reason {
-            REASON_ENDSTOP => {
-                self.stopped(board);
-                Ok(())
-            }
-            _ if self.cancelled => {
-                self.stopped(board);
-                Ok(())
-            }
-            REASON_EXPIRED if self.tries < TRIES_MAX && !self.apart => {
-                self.expired = true;
-                self.stopped(board);
-                Ok(())
-            }
-            REASON_EXPIRED => Err(self.fail(ErrorCode::HomingTimeout, NOT_HEARD)),
-            _ => Err(self.fail(ErrorCode::EndstopNotReached, "")),
+            REASON_ENDSTOP => {}
+            _ if self.cancelled => {}
+            REASON_EXPIRED if self.tries < TRIES_MAX && !self.apart => self.expired = true,
+            REASON_EXPIRED => return Err(self.fail(ErrorCode::HomingTimeout, NOT_HEARD)),
+            _ => return Err(self.fail(ErrorCode::EndstopNotReached, "")),
         }
+        stop.has_fired = true;
+        if self.armed().next().is_none() {
+            self.stopped(board);
+        }
+        Ok(())
     }
 
+    /// Every motor has been stopped.
     fn stopped(&mut self, board: &mut Board) {
-        board.control(&Command::EndstopHome {
-            oid: self.oids.endstop.0,
-            clock: 0,
-            sample_ticks: 0,
-            sample_count: 0,
-            rest_ticks: 0,
-            pin_value: 0,
-            trsync_oid: 0,
-            trigger_reason: 0,
-        });
-        // Armed anew without reports: it has nothing more to say.
-        board.control(&Command::TrsyncStart {
-            oid: self.oids.trsync.0,
-            report_clock: 0,
-            report_ticks: 0,
-            expire_reason: 0,
-        });
+        self.stops.iter().for_each(|stop| stop.disarm(board));
         self.abandon = true;
         self.enter(Stage::PositionAfter);
     }
 
-    /// Begins an approach that the time-out has ended once more, from where the motor stands.
-    fn go_on(&mut self, position: i32, now: Seconds) -> Result<(), PrinterError> {
+    /// Begins an approach that the time-out has ended once more, from where the motors stand.
+    fn go_on(&mut self, now: Seconds) -> Result<(), PrinterError> {
         if self.asked.is_some_and(|(first, _)| now - first > APART_MAX) {
             return Err(self.fail(ErrorCode::HomingTimeout, NOT_HEARD));
         }
-        if self.travel_left_mm() < self.step_mm {
+        if self.travel_left_mm() < self.step_mm() {
             return Err(self.fail(ErrorCode::EndstopNotReached, ""));
         }
-        self.position_before = position;
         self.goes_on = true;
         self.enter(Stage::Plan);
         Ok(())
@@ -414,27 +414,33 @@ impl AxisHoming {
         now: Seconds,
         board: &mut Board,
     ) -> Result<(), PrinterError> {
-        if oid != self.oids.endstop.0 {
+        let Some(index) = self.stops.iter().position(|stop| stop.oids.endstop.0 == oid) else {
             return Ok(());
-        }
-        match &mut self.stage {
-            Stage::Approach { heard, .. } => {
+        };
+        let stop = &mut self.stops[index];
+        match &self.stage {
+            Stage::Approach { .. } if stop.has_fired => Ok(()),
+            Stage::Approach { .. } => {
                 if homing {
-                    *heard = now;
+                    stop.heard = now;
                     self.asked = None;
                 } else {
                     // The report that it fired was lost: have it repeated, with its reason.
-                    board.control(&Command::TrsyncTrigger { oid: self.oids.trsync.0, reason: REASON_HOST });
+                    board.control(&Command::TrsyncTrigger { oid: stop.oids.trsync.0, reason: REASON_HOST });
                 }
                 Ok(())
             }
-            Stage::Released if pin_value != self.oids.inverted => {
+            Stage::Released if pin_value != stop.oids.inverted => {
                 Err(self.fail(ErrorCode::EndstopStillTriggered, "after backing off"))
             }
             Stage::Released => {
-                self.second = true;
-                (self.tries, self.approach_steps) = (0, 0);
-                self.enter(Stage::PositionBefore);
+                stop.is_released = true;
+                if self.stops.iter().all(|stop| stop.is_released) {
+                    self.second = true;
+                    self.tries = 0;
+                    self.movers.iter_mut().for_each(|mover| mover.approach_steps = 0);
+                    self.enter(Stage::PositionBefore);
+                }
                 Ok(())
             }
             _ => Ok(()),
@@ -443,30 +449,43 @@ impl AxisHoming {
 
     /// The board reports where a motor stands.
     pub(super) fn on_position(&mut self, oid: u8, position: i32, now: Seconds) -> Result<(), PrinterError> {
-        if oid != self.stepper {
+        let before = match self.stage {
+            Stage::PositionBefore => true,
+            Stage::PositionAfter => false,
+            _ => return Ok(()),
+        };
+        let mover = self.movers.iter_mut().find(|mover| mover.oid == oid && !mover.has_answered);
+        let Some(mover) = mover else { return Ok(()) };
+        let made = u64::from(position.wrapping_sub(mover.position).unsigned_abs());
+        (mover.position, mover.has_answered) = (position, true);
+        mover.first.get_or_insert(position);
+        if !before {
+            mover.steps += made;
+            mover.approach_steps += made;
+        }
+        if !self.movers.iter().all(|mover| mover.has_answered) {
             return Ok(());
         }
-        match self.stage {
-            Stage::PositionBefore => {
-                self.position_before = position;
-                self.enter(Stage::Plan);
-            }
-            Stage::PositionAfter => {
-                let made = u64::from(position.wrapping_sub(self.position_before).unsigned_abs());
-                self.steps += made;
-                self.approach_steps += made;
-                if core::mem::take(&mut self.expired) {
-                    return self.go_on(position, now);
-                }
-                if self.second && self.approach_steps == 0 {
-                    // It was open after backing off: closed without a step it is no switch at the axis' end.
-                    return Err(self.fail(ErrorCode::EndstopBeforeMove, "on its second approach"));
-                }
-                let again = !self.second && self.retract_mm > 0.0;
-                self.enter(if again { Stage::PlanRetract } else { Stage::Done });
-            }
-            _ => {}
+        if before {
+            self.enter(Stage::Plan);
+            return Ok(());
         }
+        if core::mem::take(&mut self.expired) {
+            return self.go_on(now);
+        }
+        let has_moved =
+            |stop: usize| self.movers.iter().any(|mover| mover.stop == stop && mover.approach_steps > 0);
+        if self.second && !(0..self.stops.len()).all(has_moved) {
+            // It was open after backing off: closed without a step it is no switch at the axis' end.
+            return Err(self.fail(ErrorCode::EndstopBeforeMove, "on its second approach"));
+        }
+        let again = !self.second && self.retract_mm > 0.0;
+        let drift = parts::drift(self.axis, &self.movers, &self.geometry);
+        self.enter(match drift {
+            _ if again => Stage::PlanRetract,
+            [0.0, 0.0, 0.0] => Stage::Done,
+            drift => Stage::PlanStraight(drift),
+        });
         Ok(())
     }
 }

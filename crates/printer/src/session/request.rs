@@ -198,10 +198,10 @@ impl Session {
         }
     }
 
-    /// Where the last planned move ends: X, Y, Z, E in mm, and which axes are homed.
+    /// Where the last planned move ends, in the G-code's coordinates: X, Y, Z, E in mm, and which axes are homed.
     pub fn position(&self) -> Option<(Position, [bool; 3])> {
         match &self.stage {
-            Stage::Ready(ready) => Some((ready.planner.position(), ready.planner.guard.homed())),
+            Stage::Ready(ready) => Some((ready.planner.gcode_position(), ready.planner.guard.homed())),
             _ => None,
         }
     }
@@ -270,6 +270,10 @@ impl Ready {
         if !limits.is_some_and(|(min, max)| (min..=max).contains(&position)) {
             let detail = format!("an axis cannot stand at {position}");
             return Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail));
+        }
+        if machine::homed_together(&self.config, [true, false, false]) == [true; 3] {
+            let detail = "where a delta's head is cannot be said axis by axis: home it, it goes upwards";
+            return Err(PrinterError::new(ErrorCode::NotHomed, detail));
         }
         self.diary.lose_place(&mut self.board);
         self.planner.set_axis(axis, position.0, true);

@@ -20,7 +20,7 @@ use crate::{
     error::PrinterError,
     journal::{MotorQueue, Row, RowPlace},
     link::Lane,
-    machine::MOTORS,
+    machine::{MOTORS, Motors},
     pace::Pace,
     planner::Position,
 };
@@ -429,19 +429,20 @@ impl MotionStream {
         self.counts[motor]
     }
 
-    /// Where the machine stands, in mm, from where the board counts its motors to be: the present run was broken off.
+    /// Where the machine stands, in mm, from where the board counts its motors to be: the present run was broken off. None
+    /// where no head could be.
     pub(super) fn position_of(
         &self,
         counts: [i32; MOTORS],
-        steps_mm: [f64; MOTORS],
+        motors: &Motors,
         board: &Board,
-    ) -> Position {
-        core::array::from_fn(|motor| {
-            let made = f64::from(counts[motor].wrapping_sub(self.counts_at_start[motor]));
+    ) -> Option<Position> {
+        let made = core::array::from_fn(|motor: usize| {
+            let made = counts[motor].wrapping_sub(self.counts_at_start[motor]);
             let is_inverted = board.layout.steppers[motor].is_some_and(|oids| oids.invert_dir);
-            let made = if is_inverted { -made } else { made };
-            self.position_at_start[motor] + made * steps_mm[motor]
-        })
+            if is_inverted { made.wrapping_neg() } else { made }
+        });
+        motors.moved(&self.position_at_start, made)
     }
 
     /// The clock up to which the board has all steps of the run: that of the first which it has not acknowledged, or

@@ -20,7 +20,7 @@ fn homing_finds_the_endstops_and_claims_positions_only_then() {
         .iter()
         .filter_map(|event| match event {
             Event::Homed { axis, steps, .. } => {
-                assert!(*steps > 100);
+                assert!(steps[*axis] > 100);
                 Some(*axis)
             }
             _ => None,

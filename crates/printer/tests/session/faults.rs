@@ -49,6 +49,14 @@ fn a_job_that_extrudes_cold() {
 }
 
 #[test]
+fn a_job_that_moves_filament_by_the_metre() {
+    for line in ["G1 E60", "G1 E-60", "G1 X30 E-60", "G1 X30 E-999999999"] {
+        let file = format!("{START}G1 X20 F6000\n{line}\n");
+        fails(&file, ErrorCode::ExtrusionTooLong, Some(9));
+    }
+}
+
+#[test]
 fn a_job_with_a_line_that_cannot_be_read() {
     let file = squares(2).replacen("G1 Y90 E1", "G1 Y9O E1", 1);
     let line = file.lines().position(|line| line.contains("9O")).unwrap() as u32 + 1;

@@ -10,6 +10,7 @@ mod filters;
 mod heaters;
 mod hold;
 mod homing;
+mod level;
 mod link;
 mod machine;
 mod pause;

@@ -26,7 +26,10 @@ use std::{
 
 use anyhow::Context;
 use clap::ValueEnum;
-use printer::{config::PrinterConfig, session::JobOptions};
+use printer::{
+    config::{Kinematics, PrinterConfig},
+    session::JobOptions,
+};
 use units::{MmPerS2, Seconds};
 use virtual_printer::BoardProfile;
 
@@ -71,6 +74,8 @@ const SCENARIO_STREAM: u64 = 100;
 /// What all runs have in common.
 struct Campaign {
     config: PrinterConfig,
+    /// Where generated prints move, X and Y.
+    fast_range: [f64; 2],
     sources: Vec<Source>,
     scenarios: Vec<Scenario>,
     save: Option<PathBuf>,
@@ -153,16 +158,24 @@ impl Campaign {
             sources.extend(SAMPLES.iter().filter_map(|(name, text)| Source::new(name, text)));
         }
         let wanted: BTreeSet<Scenario> = args.scenarios.iter().copied().collect();
+        let is_cartesian = config.printer.kinematics == Kinematics::Cartesian;
+        anyhow::ensure!(
+            is_cartesian || !wanted.contains(&Scenario::PowerLoss),
+            "power_loss: where a nozzle was when the power went is only followed on cartesian machines"
+        );
         let all = Scenario::value_variants().iter().copied();
-        let scenarios = all.filter(|scenario| wanted.is_empty() || wanted.contains(scenario)).collect();
-        Ok(Self { config, sources, scenarios, save: args.save.clone() })
+        let may = |scenario: &Scenario| is_cartesian || *scenario != Scenario::PowerLoss;
+        let scenarios =
+            all.filter(|it| if wanted.is_empty() { may(it) } else { wanted.contains(it) }).collect();
+        let fast_range = window::fast_range(&config);
+        Ok(Self { config, fast_range, sources, scenarios, save: args.save.clone() })
     }
 
     /// One window, clean and with each scenario's fault.
     fn run(&self, seed: u64, classes: &Mutex<BTreeMap<Scenario, Class>>) -> anyhow::Result<()> {
         let mut chance = Chance::new(seed, WINDOW_STREAM);
         let window = if chance.part() < FAST_PART {
-            window::fast(&mut chance)
+            window::fast(&mut chance, self.fast_range)
         } else {
             chance.pick(&self.sources).window(&mut chance)
         };

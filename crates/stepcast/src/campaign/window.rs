@@ -6,6 +6,8 @@
 
 use std::{fmt::Write as _, sync::Arc};
 
+use printer::config::{Kinematics, PrinterConfig};
+
 use super::chance::Chance;
 
 /// The most lines of a file that windows are taken from.
@@ -20,6 +22,17 @@ const FAST_MM_S: f64 = 300.0;
 pub(super) const FAST_ACCEL_MM_S2: f64 = 10_000.0;
 /// Where they move: a square of the bed, in mm.
 const FAST_RANGE_MM: [f64; 2] = [10.0, 180.0];
+
+/// Where generated prints move on a machine: around the middle of a round bed, as far as a square goes.
+pub(super) fn fast_range(config: &PrinterConfig) -> [f64; 2] {
+    match &config.printer.kinematics {
+        Kinematics::Delta(delta) => {
+            let far = delta.print_radius.0 / core::f64::consts::SQRT_2 - 1.0;
+            [-far, far]
+        }
+        _ => FAST_RANGE_MM,
+    }
+}
 
 /// A print.
 #[derive(Clone, Debug)]
@@ -177,9 +190,8 @@ impl<'a> Words<'a> {
 }
 
 /// To and fro over the bed, at any speed and acceleration that a machine may have, without heat.
-pub(super) fn fast(chance: &mut Chance) -> Window {
+pub(super) fn fast(chance: &mut Chance, [low, high]: [f64; 2]) -> Window {
     let mut text = "G28\nG90\nG1 Z5 F900\n".to_owned();
-    let [low, high] = FAST_RANGE_MM;
     let mut place = [chance.between(low..high), chance.between(low..high)];
     let _ = writeln!(text, "G1 X{:.3} Y{:.3} F9000", place[0], place[1]);
     let mut took_s = 0.0;
@@ -232,7 +244,7 @@ mod tests {
     #[test]
     fn fast_ones_stay_on_the_bed_and_below_their_limits() {
         for seed in 0..50 {
-            let window = fast(&mut Chance::new(seed, 1));
+            let window = fast(&mut Chance::new(seed, 1), FAST_RANGE_MM);
             for line in std::str::from_utf8(&window.gcode).unwrap().lines() {
                 let words = Words::of(line);
                 assert!(words.get('F').is_none_or(|feed| feed <= 60.0 * FAST_MM_S), "{line}");

@@ -3,12 +3,15 @@
 //! The session says which move it makes when; each of them must be the file's next move, from its first to its last. Knows
 //! G-code and nothing of pulses. Positions in mm, filament counted from the start of the file.
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, sync::Arc};
 
-use gcode::{Action, Arc, CHORD_TOLERANCE, Chords, Interpreter, Lines, Move, Settings};
+use gcode::{Action, CHORD_TOLERANCE, Chords, Interpreter, Lines, Move, Settings};
+use printer::transform::{Profiles, Transform};
+
+use super::{arc_way::ArcWay, bent_path::BentMove};
 
 /// How far a move's end may be from the file's, in mm: the dust of arithmetic, far below a step.
-const SAME_PLACE_MM: f64 = 1e-6;
+pub(super) const SAME_PLACE_MM: f64 = 1e-6;
 /// X, Y, Z.
 const AXES: usize = 3;
 /// The most homed positions that wait for their line: one an axis, and an axis may be homed again.
@@ -26,19 +29,19 @@ impl MoreGcode for crate::input::Input {
     }
 }
 
-/// A straight piece of the path.
+/// A piece of the path: a move of the look-ahead's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Piece {
     pub(crate) line: u32,
     pub(crate) from: [f64; 4],
     pub(crate) to: [f64; 4],
-    /// How far the true line, an arc, bulges from this straight one.
-    pub(crate) bulge_mm: f64,
+    /// The way between its ends, where it is not straight.
+    pub(crate) arc: Option<ArcWay>,
 }
 
 impl Piece {
-    fn new(mv: &Move, bulge_mm: f64) -> Self {
-        Self { line: mv.line.0, from: mv.from.to_array(), to: mv.to.to_array(), bulge_mm }
+    fn new(mv: &Move, arc: Option<ArcWay>) -> Self {
+        Self { line: mv.line.0, from: mv.from.to_array(), to: mv.to.to_array(), arc }
     }
 
     /// Whether it moves anything by more than dust.
@@ -56,11 +59,21 @@ pub(crate) struct GcodePath<R> {
     next_action: usize,
     /// The line that they are of.
     line: u32,
-    /// The arc that is being flattened.
-    chords: Option<(Chords, Arc)>,
+    /// The arc that is being cut into pieces.
+    chords: Option<Chords>,
     homed: VecDeque<(usize, f64)>,
+    /// From the file's coordinates to the machine's …
+    transform: Transform,
+    /// … what can be loaded …
+    profiles: Arc<Profiles>,
+    /// … and the move that is being made in pieces for it.
+    bent: Option<BentMove>,
+    /// A line has changed where places are, and the head has not moved since.
+    is_moved_over: bool,
     /// Lines before this one are read, not made; where axes are once they are homed there.
     begins: (u32, [f64; AXES]),
+    /// The machine homes all axes together.
+    pub(crate) homes_together: bool,
     fed_all: bool,
     ended: bool,
     /// The file has changed pressure advance or an input shaper on the way.
@@ -68,8 +81,8 @@ pub(crate) struct GcodePath<R> {
 }
 
 impl<R: MoreGcode> GcodePath<R> {
-    /// The path of a file, for a machine that stands at 0 and understands it by these settings.
-    pub(crate) fn new(source: R, settings: Settings) -> Self {
+    /// The path of a file, for a machine that stands at 0 and understands it by these settings and profiles.
+    pub(crate) fn new(source: R, settings: Settings, profiles: Arc<Profiles>) -> Self {
         Self {
             source,
             lines: Lines::new(),
@@ -79,7 +92,12 @@ impl<R: MoreGcode> GcodePath<R> {
             line: 0,
             chords: None,
             homed: VecDeque::new(),
+            transform: Transform::default(),
+            profiles,
+            bent: None,
+            is_moved_over: false,
             begins: (0, [0.0; AXES]),
+            homes_together: false,
             fed_all: false,
             ended: false,
             filters: false,
@@ -89,6 +107,11 @@ impl<R: MoreGcode> GcodePath<R> {
     /// The print begins with this line; those before are read as if axes had been homed to these positions.
     pub(crate) fn begin_with(&mut self, line: u32, endstops: [f64; AXES]) {
         self.begins = (line, endstops);
+    }
+
+    /// The axes that the machine homes where the file wants these to be.
+    fn homed_by(&self, axes: [bool; AXES]) -> [bool; AXES] {
+        if self.homes_together && axes.contains(&true) { [true; AXES] } else { axes }
     }
 
     /// The printer found this axis' endstop and says that it is here.
@@ -102,9 +125,29 @@ impl<R: MoreGcode> GcodePath<R> {
     /// Takes the file's next move, which must be this one.
     pub(crate) fn take(&mut self, line: u32, from: [f64; 4], to: [f64; 4]) -> anyhow::Result<Piece> {
         loop {
-            let Some(piece) = self.next()? else {
+            if let Some(bent) = &mut self.bent {
+                let taken = bent.take(&self.transform, line, from, to);
+                self.bent.take_if(|bent| bent.is_made());
+                return taken;
+            }
+            let Some(mut piece) = self.next()? else {
                 anyhow::bail!("the printer makes a move for line {line}, but the file has no more moves");
             };
+            if self.transform.is_identity() {
+                if self.is_moved_over && piece.has_length() {
+                    // It leads there from where the head stood.
+                    piece.from[..AXES].copy_from_slice(&from[..AXES]);
+                    self.is_moved_over = false;
+                }
+            } else {
+                if piece.from[..AXES] != piece.to[..AXES] {
+                    self.bent = Some(BentMove::new(piece, &self.transform, from));
+                    continue;
+                }
+                // Filament alone leaves the head where it is.
+                piece.from[..AXES].copy_from_slice(&from[..AXES]);
+                piece.to[..AXES].copy_from_slice(&from[..AXES]);
+            }
             let filament = (piece.to[AXES] - piece.from[AXES]) - (to[AXES] - from[AXES]);
             let same = piece.line == line
                 && (0..AXES).all(|axis| (piece.to[axis] - to[axis]).abs() <= SAME_PLACE_MM)
@@ -125,6 +168,9 @@ impl<R: MoreGcode> GcodePath<R> {
 
     /// Makes sure that no moves are left.
     pub(crate) fn finish(&mut self) -> anyhow::Result<()> {
+        if self.bent.is_some() {
+            anyhow::bail!("a move of line {} was not made to its end", self.line);
+        }
         while let Some(piece) = self.next()? {
             if piece.has_length() {
                 anyhow::bail!("the move to {} of line {} was never made", place(piece.to), piece.line);
@@ -135,9 +181,9 @@ impl<R: MoreGcode> GcodePath<R> {
 
     fn next(&mut self) -> anyhow::Result<Option<Piece>> {
         loop {
-            if let Some((chords, arc)) = &mut self.chords {
-                if let Some(chord) = chords.next() {
-                    return Ok(Some(Piece::new(&chord, sagitta(arc, &chord))));
+            if let Some(chords) = &mut self.chords {
+                if let Some(piece) = chords.next_piece() {
+                    return Ok(Some(Piece::new(&piece.chord, Some(ArcWay::new(&piece)))));
                 }
                 self.chords = None;
             }
@@ -149,10 +195,11 @@ impl<R: MoreGcode> GcodePath<R> {
                     continue;
                 }
                 match action {
-                    Action::Move(mv) => return Ok(Some(Piece::new(&mv, 0.0))),
-                    Action::Arc(arc) => self.chords = Some((arc.chords(CHORD_TOLERANCE), arc)),
+                    Action::Move(mv) => return Ok(Some(Piece::new(&mv, None))),
+                    Action::Arc(arc) => self.chords = Some(arc.chords(CHORD_TOLERANCE)),
                     Action::Home { x, y, z } => self.home([x, y, z])?,
                     Action::Cancel => self.ended = true,
+                    Action::Skew(_) | Action::BedMesh(_) => self.set_transform(&action),
                     Action::PressureAdvance { .. } | Action::InputShaper(_) => self.filters = true,
                     _ => {}
                 }
@@ -167,9 +214,20 @@ impl<R: MoreGcode> GcodePath<R> {
     /// An action of a line that is not made.
     fn pass(&mut self, action: &Action) {
         if let Action::Home { x, y, z } = *action {
-            let at = |axis: usize, is: bool| is.then_some(self.begins.1[axis]);
-            self.interpreter.set_axes(at(0, x), at(1, y), at(2, z));
+            let axes = self.homed_by([x, y, z]);
+            let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.begins.1[axis]));
+            self.interpreter.set_axes(x, y, z);
         }
+        if matches!(action, Action::Skew(_) | Action::BedMesh(_)) {
+            self.set_transform(action);
+        }
+    }
+
+    /// What cannot be loaded ends the print, which is told elsewhere.
+    fn set_transform(&mut self, action: &Action) {
+        let before = self.transform.clone();
+        let _ = self.transform.set(action, &self.profiles);
+        self.is_moved_over |= self.transform != before;
     }
 
     /// Reads the next line into `actions`; `false` at the end.
@@ -198,6 +256,7 @@ impl<R: MoreGcode> GcodePath<R> {
     }
 
     fn home(&mut self, axes: [bool; AXES]) -> anyhow::Result<()> {
+        let axes = self.homed_by(axes);
         let mut at = [None; AXES];
         for axis in (0..AXES).filter(|&axis| axes[axis]) {
             let Some(found) = self.homed.iter().position(|&(homed, _)| homed == axis) else {
@@ -211,17 +270,7 @@ impl<R: MoreGcode> GcodePath<R> {
     }
 }
 
-/// How far an arc's chord is from the arc in its middle.
-fn sagitta(arc: &Arc, chord: &Move) -> f64 {
-    let [first, second, _] = arc.plane.axes();
-    let (from, to) = (chord.from.to_array(), chord.to.to_array());
-    let [across, along] = [to[first] - from[first], to[second] - from[second]];
-    let half = (across * across + along * along).sqrt() / 2.0;
-    let radius = arc.radii().into_iter().fold(0.0, f64::max);
-    if half >= radius { radius } else { radius - (radius * radius - half * half).sqrt() }
-}
-
-fn place([x, y, z, e]: [f64; 4]) -> String {
+pub(super) fn place([x, y, z, e]: [f64; 4]) -> String {
     format!("X{x:.4} Y{y:.4} Z{z:.4} (filament {e:.4})")
 }
 
@@ -242,7 +291,7 @@ mod tests {
     }
 
     fn path(text: &'static str) -> GcodePath<Text> {
-        GcodePath::new(Text(text.as_bytes(), 7), Settings::default())
+        GcodePath::new(Text(text.as_bytes(), 7), Settings::default(), Arc::default())
     }
 
     const FILE: &str = "G28\nG92 E0\nG1 X10 F600\nG1 X10\nM117 hello\nG1 X10 Y5 E0.5\n";
@@ -254,7 +303,7 @@ mod tests {
             path.homed(axis, 0.0);
         }
         let first = path.take(3, [0.0; 4], [10.0, 0.0, 0.0, 0.0]).unwrap();
-        assert_eq!((first.line, first.to[0], first.bulge_mm), (3, 10.0, 0.0));
+        assert_eq!((first.line, first.to[0], first.arc), (3, 10.0, None));
         // Line 4 leads nowhere and is passed over. The filament counts by its difference.
         path.take(6, [10.0, 0.0, 0.0, 100.0], [10.0, 5.0, 0.0, 100.5]).unwrap();
         path.finish().unwrap();
@@ -296,12 +345,14 @@ mod tests {
     }
 
     #[test]
-    fn arcs_come_as_chords_with_their_bulge() {
+    fn arcs_come_in_pieces_of_themselves() {
         let mut path = path("G1 X10 F600\nG3 X-10 Y0 I-10 J0\n");
         path.take(1, [0.0; 4], [10.0, 0.0, 0.0, 0.0]).unwrap();
         let mut count = 0;
         while let Some(piece) = path.next().unwrap() {
-            assert!(piece.bulge_mm > 0.0 && piece.bulge_mm <= CHORD_TOLERANCE.0 + 1e-9, "{piece:?}");
+            let middle = [0, 1].map(|axis| 0.5 * (piece.from[axis] + piece.to[axis]));
+            let bulge = piece.arc.unwrap().distance_squared([middle[0], middle[1], 0.0], 0.5).sqrt();
+            assert!(bulge > 0.0 && bulge <= CHORD_TOLERANCE.0 + 1e-9, "{piece:?}");
             count += 1;
         }
         assert!(count > 30);

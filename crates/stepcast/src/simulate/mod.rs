@@ -3,6 +3,8 @@
 //! The file is checked, as a user's would be before a print; then a session prints it on a simulated board, while the
 //! same file, read a second time, says what the pulses should draw.
 
+mod arc_way;
+mod bent_path;
 mod course;
 mod digest;
 mod gcode_path;

@@ -5,15 +5,16 @@
 
 use gcode::Heater;
 use printer::{
-    config::PrinterConfig,
+    config::{Kinematics, PrinterConfig},
     error::PrinterError,
     machine::{EXTRUDER, MOTOR_NAMES, MOTORS},
     session::{Event, PhaseName, ScheduledMove},
 };
 use units::{Seconds, Ticks};
-use virtual_printer::VirtualPrinter;
+use virtual_printer::{Gantry, VirtualPrinter};
 
 use super::{
+    arc_way::ArcWay,
     gcode_path::{GcodePath, Piece},
     path_check::Span,
     report::Homing,
@@ -56,6 +57,11 @@ struct Aside {
 /// Follows a print.
 pub(super) struct Observer {
     pub(super) step_distance_mm: [f64; MOTORS],
+    /// How the motors hold the head, as the machine has it.
+    gantry: Gantry,
+    pub(super) names: [&'static str; MOTORS],
+    /// Where the carriage is that presses each endstop, in mm.
+    switch_mm: [f64; 3],
     endstop_mm: [f64; 3],
     gcode: GcodePath<Input>,
     /// Steps of all moves that were scheduled.
@@ -105,13 +111,29 @@ pub(super) struct Observer {
 
 impl Observer {
     /// Nothing has happened yet. `reference` is the file, opened a second time; `quiet` shows none of its texts.
-    pub(super) fn new(config: &PrinterConfig, reference: Input, start: Ticks, quiet: bool) -> Self {
+    pub(super) fn new(
+        config: &PrinterConfig,
+        gantry: Gantry,
+        reference: Input,
+        start: Ticks,
+        quiet: bool,
+    ) -> Self {
+        let profiles = std::sync::Arc::clone(&config.profiles);
+        let mut gcode = GcodePath::new(reference, printer::machine::gcode_settings(config), profiles);
+        gcode.homes_together = matches!(gantry, Gantry::Delta(_));
+        let endstop_mm = config.steppers.each_ref().map(|axis| axis.position_endstop.0);
         Self {
+            gantry,
+            names: printer::machine::motor_names(config),
+            switch_mm: match config.printer.kinematics {
+                Kinematics::Delta(delta) => delta.endstops().map(|at| at.0),
+                _ => endstop_mm,
+            },
             step_distance_mm: printer::machine::step_distances(config).map(|distance| distance.0),
-            endstop_mm: config.steppers.each_ref().map(|axis| axis.position_endstop.0),
-            gcode: GcodePath::new(reference, printer::machine::gcode_settings(config)),
+            endstop_mm,
+            gcode,
             planned: [0; MOTORS],
-            filtered: filtered(config),
+            filtered: filtered(config, &gantry),
             end: None,
             moves: 0,
             homing: Vec::new(),
@@ -233,11 +255,7 @@ impl Observer {
                 tally.path.set_position(EXTRUDER, from[EXTRUDER]);
             }
         }
-        if self.aside.is_none() {
-            self.plan_steps(scheduled);
-            self.end = Some(to);
-        }
-        let mut piece = Piece { line, from, to, bulge_mm: 0.0 };
+        let mut piece = Piece { line, from, to, arc: None };
         if !homing {
             self.moves += 1;
             if line > 0 && self.mismatch.is_none() {
@@ -245,14 +263,17 @@ impl Observer {
                     Ok(found) => {
                         piece.from[..EXTRUDER].copy_from_slice(&found.from[..EXTRUDER]);
                         piece.to[..EXTRUDER].copy_from_slice(&found.to[..EXTRUDER]);
-                        piece.bulge_mm = found.bulge_mm;
+                        piece.arc = found.arc;
                     }
                     Err(error) => self.mismatch = Some(format!("{error:#}")),
                 }
             }
         }
-        let span =
-            Span { line, start, end, from: piece.from, to: piece.to, bulge_mm: piece.bulge_mm, homing };
+        if self.aside.is_none() {
+            self.plan_steps(scheduled, piece.arc.as_ref());
+            self.end = Some(to);
+        }
+        let span = Span { line, start, end, from: piece.from, to: piece.to, arc: piece.arc, homing };
         if tally.path.expect(&span).is_err() {
             self.mismatch
                 .get_or_insert_with(|| format!("line {line} was planned too far ahead to be followed"));
@@ -305,29 +326,50 @@ impl Observer {
 
     /// Counts the steps of a move: those where it crosses half-way between two positions of a motor. An approach to an
     /// endstop counts by what was made of it, which comes with [`Event::Homed`].
-    fn plan_steps(&mut self, scheduled: &ScheduledMove) {
+    fn plan_steps(&mut self, scheduled: &ScheduledMove, arc: Option<&ArcWay>) {
+        let (from, to) = (scheduled.from, scheduled.to);
+        // A step or two are no approach: motors that have not stopped together are put right.
+        let short = 3.0 * self.step_distance_mm[..EXTRUDER].iter().copied().fold(0.0, f64::max);
+        let reaches =
+            |axis: usize| to[axis] == self.endstop_mm[axis] && (from[axis] - to[axis]).abs() > short;
+        if scheduled.homing && (0..EXTRUDER).any(reaches) {
+            return;
+        }
+        let motors = |[x, y, z, e]: [f64; MOTORS]| {
+            let [a, b, c] = self.gantry.motors([x, y, z]);
+            [a, b, c, e]
+        };
+        let (from, to) = (motors(from), motors(to));
         for motor in 0..MOTORS {
-            let (from, to) = (scheduled.from[motor], scheduled.to[motor]);
-            let approach = scheduled.homing
-                && self.endstop_mm.get(motor).is_some_and(|&endstop| to == endstop && from != endstop);
-            if !approach {
-                let distance = self.step_distance_mm[motor];
-                self.planned[motor] += grid(to, distance).abs_diff(grid(from, distance));
-            }
+            let distance = self.step_distance_mm[motor];
+            let along = |way: [f64; 3]| self.gantry.motors(way)[motor];
+            let turn = arc.filter(|_| motor < EXTRUDER).and_then(|arc| arc.turning_point(along));
+            let turn = grid(turn.unwrap_or(from[motor]), distance);
+            self.planned[motor] +=
+                turn.abs_diff(grid(from[motor], distance)) + grid(to[motor], distance).abs_diff(turn);
         }
     }
 
-    fn take_homed(&mut self, axis: usize, position_mm: f64, steps: u64, printer: &mut VirtualPrinter<Tally>) {
+    fn take_homed(
+        &mut self,
+        axis: usize,
+        position_mm: f64,
+        steps: [u64; MOTORS],
+        printer: &mut VirtualPrinter<Tally>,
+    ) {
         let state = printer.state();
         printer.recorder_mut().path.set_position(axis, position_mm);
         self.gcode.homed(axis, position_mm);
-        self.planned[axis] += steps;
+        for (planned, made) in self.planned.iter_mut().zip(steps) {
+            *planned += made;
+        }
         if self.homing.len() < HOMINGS_MAX {
+            let found_mm = state.endstops.get(axis).map_or(f64::NAN, |endstop| endstop.position.0);
             self.homing.push(Homing {
-                motor: MOTOR_NAMES[axis],
+                motor: self.names[axis],
                 position_mm,
-                error_mm: state.motors[axis].position.0 - position_mm,
-                steps,
+                error_mm: found_mm - self.switch_mm[axis],
+                steps: steps[axis],
             });
         }
     }
@@ -358,11 +400,17 @@ impl Observer {
     }
 }
 
-/// The motors on whose paths the machine file has a filter.
-fn filtered(config: &PrinterConfig) -> [bool; MOTORS] {
+/// The motors on whose paths the machine file has a filter, and those whose way is not straight where the head's is.
+fn filtered(config: &PrinterConfig, gantry: &Gantry) -> [bool; MOTORS] {
     let [x, y] = config.input_shaper.each_ref().map(|shaper| shaper.shaper().is_some());
     let e = config.extruder.as_ref().is_some_and(|extruder| !extruder.advance.is_none());
-    [x, y, false, e]
+    let follows = |motor: usize, axis: usize| {
+        let way: [f64; 3] = core::array::from_fn(|it| f64::from(u8::from(it == axis)));
+        gantry.motors(way)[motor] != gantry.motors([0.0; 3])[motor]
+    };
+    let is_delta = matches!(gantry, Gantry::Delta(_));
+    let of = |motor: usize| is_delta || (x && follows(motor, 0)) || (y && follows(motor, 1));
+    [of(0), of(1), of(2), e]
 }
 
 /// The number of the motor position nearest to a place; one exactly half-way belongs to the upper one.

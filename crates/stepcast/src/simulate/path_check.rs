@@ -1,6 +1,6 @@
 //! How far the path that the pulses draw strays from the path that the G-code asks for.
 //!
-//! Both ways and in order. Every pulse: the head's position after it is measured against the line that is being executed
+//! Both ways and in order. Every pulse: the head's position after it is measured against the line, or the arc, that is being executed
 //! at that moment. Every line: its end point is measured against what has been drawn when the line ends. Since a pulse
 //! moves the head by a single step, a head that stays beside the line and comes to its end has drawn all of it.
 //! Near the boundary of two lines a pulse may be early or late by the error that step compression is allowed, so
@@ -12,6 +12,9 @@
 use std::collections::VecDeque;
 
 use units::{Hertz, Seconds, Ticks};
+use virtual_printer::Gantry;
+
+use super::arc_way::ArcWay;
 
 /// How early or late a step may come: within this time of a boundary the neighbouring line counts too.
 pub(crate) const BOUNDARY_TOLERANCE: Seconds = Seconds(25e-6);
@@ -35,8 +38,8 @@ pub(crate) struct Span {
     pub(crate) from: [f64; 4],
     /// Where it ends.
     pub(crate) to: [f64; 4],
-    /// How far the G-code's own line bulges from this straight one, for the chords of an arc.
-    pub(crate) bulge_mm: f64,
+    /// The G-code's own way, where it is not straight.
+    pub(crate) arc: Option<ArcWay>,
     /// A homing move: a trigger may cut it short, and positions have no meaning before it ends. Not measured.
     pub(crate) homing: bool,
 }
@@ -61,7 +64,7 @@ struct Segment {
     inverse_length_squared: f64,
     to: [f64; AXES],
     filament: f64,
-    bulge_mm: f64,
+    arc: Option<ArcWay>,
     start: u64,
     end: u64,
     line: u32,
@@ -83,7 +86,7 @@ impl Segment {
             inverse_length_squared: if length_squared > 0.0 { 1.0 / length_squared } else { 0.0 },
             to: [to_x, to_y, to_z],
             filament,
-            bulge_mm: span.bulge_mm,
+            arc: span.arc,
             start: span.start.0,
             end: span.end.0,
             line: span.line,
@@ -97,6 +100,9 @@ impl Segment {
     fn distance_squared(&self, point: [f64; AXES]) -> f64 {
         let offset = minus(point, self.from);
         let along = (dot(offset, self.way) * self.inverse_length_squared).clamp(0.0, 1.0);
+        if let Some(arc) = &self.arc {
+            return arc.distance_squared(point, along);
+        }
         let [x, y, z] = self.way;
         let rest = minus(offset, [along * x, along * y, along * z]);
         dot(rest, rest)
@@ -123,6 +129,10 @@ fn minus(a: [f64; AXES], b: [f64; AXES]) -> [f64; AXES] {
 #[derive(Clone, Debug)]
 pub(crate) struct PathCheck {
     step_distance_mm: [f64; 4],
+    /// How the motors hold the head.
+    gantry: Gantry,
+    /// Where each motor is.
+    motors_mm: [f64; AXES],
     /// Position of each motor at count 0.
     origin_mm: [f64; 4],
     counts: [i64; 4],
@@ -150,6 +160,8 @@ impl PathCheck {
     pub(crate) fn new(step_distance_mm: [f64; 4], clock: Hertz, reach: Seconds) -> Self {
         Self {
             step_distance_mm,
+            gantry: Gantry::default(),
+            motors_mm: [0.0; AXES],
             origin_mm: [0.0; 4],
             counts: [0; 4],
             position: [0.0; AXES],
@@ -167,8 +179,26 @@ impl PathCheck {
         }
     }
 
-    /// A motor that stands still is at this position from now on.
-    pub(crate) fn set_position(&mut self, motor: usize, position_mm: f64) {
+    /// The machine's motors hold its head like this.
+    pub(crate) const fn set_gantry(&mut self, gantry: Gantry) {
+        self.gantry = gantry;
+    }
+
+    /// An axis that stands still is at this position from now on.
+    pub(crate) fn set_position(&mut self, axis: usize, position_mm: f64) {
+        let Some(slot) = self.position.get_mut(axis) else {
+            return self.set_origin(axis, position_mm);
+        };
+        *slot = position_mm;
+        let head = self.position;
+        for (motor, at) in self.gantry.motors(head).into_iter().enumerate() {
+            self.set_origin(motor, at);
+        }
+        // Axes that have not been said yet may belong to no place of the motors.
+        self.position = head;
+    }
+
+    fn set_origin(&mut self, motor: usize, position_mm: f64) {
         let (Some(origin), Some(distance)) =
             (self.origin_mm.get_mut(motor), self.step_distance_mm.get(motor))
         else {
@@ -232,7 +262,7 @@ impl PathCheck {
         if let Some(first) = self.segments.front() {
             let distance_squared = first.distance_squared(self.position);
             if distance_squared > self.threshold_squared && first.measured {
-                let worst = Worst { distance_mm: distance_squared.sqrt() + first.bulge_mm, line: first.line };
+                let worst = Worst { distance_mm: distance_squared.sqrt(), line: first.line };
                 self.note(worst);
             }
         }
@@ -265,7 +295,17 @@ impl PathCheck {
 
     /// Where the pulses have brought a motor, in mm.
     pub(crate) fn position_mm(&self, motor: usize) -> f64 {
-        self.position.get(motor).copied().unwrap_or(self.filament)
+        self.motors_mm.get(motor).copied().unwrap_or(self.filament)
+    }
+
+    /// Whether motors move axes together.
+    pub(crate) const fn is_coupled(&self) -> bool {
+        self.gantry.is_coupled()
+    }
+
+    /// Where a motor is when the machine is there.
+    pub(crate) fn motor_mm(&self, motor: usize, [x, y, z, e]: [f64; 4]) -> f64 {
+        self.gantry.motors([x, y, z]).get(motor).copied().unwrap_or(e)
     }
 
     #[inline]
@@ -279,9 +319,14 @@ impl PathCheck {
     #[inline]
     fn place(&mut self, motor: usize) {
         let at = self.origin_mm[motor] + self.counts[motor] as f64 * self.step_distance_mm[motor];
-        match self.position.get_mut(motor) {
-            Some(axis) => *axis = at,
-            None => self.filament = at,
+        let Some(slot) = self.motors_mm.get_mut(motor) else {
+            self.filament = at;
+            return;
+        };
+        *slot = at;
+        match &self.gantry {
+            Gantry::Cartesian => self.position[motor] = at,
+            gantry => self.position = gantry.head(self.motors_mm),
         }
     }
 
@@ -302,7 +347,7 @@ impl PathCheck {
             if !segment.measured {
                 return;
             }
-            let distance_mm = segment.distance_squared(self.position).sqrt() + segment.bulge_mm;
+            let distance_mm = segment.distance_squared(self.position).sqrt();
             if best.is_none_or(|best| distance_mm < best.distance_mm) {
                 best = Some(Worst { distance_mm, line: segment.line });
             }
@@ -338,7 +383,7 @@ impl PathCheck {
                 continue;
             }
             ended.note_end(self.position, self.filament);
-            self.note(Worst { distance_mm: ended.end_squared.sqrt().max(ended.bulge_mm), line: ended.line });
+            self.note(Worst { distance_mm: ended.end_squared.sqrt(), line: ended.line });
             self.filament_worst_mm = self.filament_worst_mm.max(ended.filament_off);
         }
         if any {
@@ -349,14 +394,8 @@ impl PathCheck {
     fn note(&mut self, found: Worst) {
         if found.distance_mm > self.worst.distance_mm {
             self.worst = found;
-            self.set_threshold();
+            self.threshold_squared = found.distance_mm * found.distance_mm;
         }
-    }
-
-    fn set_threshold(&mut self) {
-        let bulge_mm = self.segments.front().map_or(0.0, |first| first.bulge_mm);
-        let threshold_mm = (self.worst.distance_mm - bulge_mm).max(0.0);
-        self.threshold_squared = threshold_mm * threshold_mm;
     }
 
     fn look_at_first(&mut self) {
@@ -367,7 +406,6 @@ impl PathCheck {
             }
             None => self.quiet_ticks = 0,
         }
-        self.set_threshold();
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt::Write as _};
 
-use printer::machine::MOTOR_NAMES;
+use printer::machine::{EXTRUDER, MOTOR_NAMES};
 use serde::Serialize;
 
 use super::course::Hour;
@@ -109,14 +109,14 @@ impl Report {
         let _ = writeln!(text, "Result       {word}");
         let _ = writeln!(text, "Print time   {time} ({:.2} s)", self.print_time_s);
         let _ = writeln!(text, "Motor            planned      counted     lost    end position");
-        for name in MOTOR_NAMES {
-            if let Some(motor) = self.motors.get(name) {
-                let Motor { planned_steps, counted_steps, lost_steps, end_position_mm } = motor;
-                let _ = writeln!(
-                    text,
-                    "  {name:<10} {planned_steps:>11} {counted_steps:>12} {lost_steps:>8} {end_position_mm:>12.4} mm"
-                );
-            }
+        let is_extruder = |name: &str| name == MOTOR_NAMES[EXTRUDER];
+        let (last, first): (Vec<_>, Vec<_>) = self.motors.iter().partition(|(name, _)| is_extruder(name));
+        for (name, motor) in first.into_iter().chain(last) {
+            let Motor { planned_steps, counted_steps, lost_steps, end_position_mm } = motor;
+            let _ = writeln!(
+                text,
+                "  {name:<10} {planned_steps:>11} {counted_steps:>12} {lost_steps:>8} {end_position_mm:>12.4} mm"
+            );
         }
         let line = self.path_error_line.map(|line| format!(" (line {line})")).unwrap_or_default();
         let _ = writeln!(text, "Path         at most {:.4} mm off{line}", self.path_error_max_mm);

@@ -181,7 +181,8 @@ impl Simulation {
         let board = demo_machine::fit(&mut config, board.as_ref())?;
         let machine = demo_machine::machine(&config)?;
         let step_distances = printer::machine::step_distances(&config).map(|distance| distance.0);
-        let tally = Tally::new(step_distances, board.clock, config.shaper_reach());
+        let mut tally = Tally::new(step_distances, board.clock, config.shaper_reach());
+        tally.path.set_gantry(machine.gantry);
         let reach = config.shaper_reach().0;
         // Where an input shaper has the head at most, off its path.
         let limits = &config.printer;
@@ -190,13 +191,13 @@ impl Simulation {
         let printer = VirtualPrinter::new(board, &machine, &faults, seed, tally)?;
         let start = printer.start();
         let clock = HostClock::new(start, host_hz);
-        let [x, y, z, _] = step_distances;
+        let step_mm = machine.gantry.head_step(step_distances);
         let standby = [
             ("extruder", config.extruder.as_ref().map(|extruder| extruder.heater.standby_temp)),
             ("heater_bed", config.heater_bed.as_ref().map(|bed| bed.standby_temp)),
         ]
         .map(|(name, standby)| (name, standby.unwrap_or(Celsius(0.0))));
-        let mut observer = Observer::new(&config, reference, start, quiet);
+        let mut observer = Observer::new(&config, machine.gantry, reference, start, quiet);
         if let Some(line) = options.start_line {
             observer.begin_with(line);
         }
@@ -228,7 +229,7 @@ impl Simulation {
             course: Course::default(),
             next_sample: start,
             seed,
-            path_error_max_mm: PATH_ERROR_MAX_MM.max((x * x + y * y + z * z).sqrt()) + shaped_off,
+            path_error_max_mm: PATH_ERROR_MAX_MM.max(step_mm) + shaped_off,
             wall_s: 0.0,
             after: After::default(),
             printer,

@@ -2,7 +2,7 @@ use units::{Celsius, MmPerS2, Seconds};
 
 use super::*;
 use crate::Annotation;
-use crate::action::{Heater, ObjectAction, ObjectId, PauseReason, VelocityLimit};
+use crate::action::{Heater, MeshChange, ObjectAction, ObjectId, PauseReason, SkewChange, VelocityLimit};
 
 fn one(line: &str) -> Action {
     let mut actions = clean(line).actions;
@@ -257,4 +257,39 @@ fn checksums_and_line_numbers_are_verified() {
     assert_eq!(clean(&sum("G1 X5")).moves().len(), 1);
     // Numbers without checksums are names of lines, as other machines' programs have them.
     assert_eq!(clean("N10 G1 X1\nN20 G1 X2\nN5").moves().len(), 2);
+}
+
+#[test]
+fn skew_and_bed_mesh() {
+    let lengths = |xy, xz, yz| Action::Skew(SkewChange::Measured { xy, xz, yz });
+    for (line, action) in [
+        ("SET_SKEW XY=140.4,142.8,99.8", lengths(Some([140.4, 142.8, 99.8]), None, None)),
+        ("set_skew xz=1,2,3 yz=\"4, 5, 6\"", lengths(None, Some([1.0, 2.0, 3.0]), Some([4.0, 5.0, 6.0]))),
+        ("SET_SKEW CLEAR=1", Action::Skew(SkewChange::Clear)),
+        ("SKEW_PROFILE LOAD=calm", Action::Skew(SkewChange::Load("calm".into()))),
+        ("GET_CURRENT_SKEW", Action::Skew(SkewChange::Report)),
+        (
+            "CALC_MEASURED_SKEW AC=140.4 BD=142.8 AD=99.8",
+            Action::Skew(SkewChange::Calculate([140.4, 142.8, 99.8])),
+        ),
+        ("BED_MESH_PROFILE LOAD=\"cold bed\"", Action::BedMesh(MeshChange::Load("cold bed".into()))),
+        ("BED_MESH_CLEAR", Action::BedMesh(MeshChange::Clear)),
+        ("BED_MESH_OUTPUT PGP=1", Action::BedMesh(MeshChange::Report)),
+    ] {
+        assert_eq!(one(line), action, "{line}");
+    }
+    for (line, said) in [
+        ("SET_SKEW XY=1,2", "1:9-15 error value-out-of-range"),
+        ("SET_SKEW XY=1,2,3,4", "1:9-19 error value-out-of-range"),
+        ("SET_SKEW XY=1,-2,3", "1:9-18 error value-out-of-range"),
+        ("SET_SKEW XY=1,nan,3", "1:9-19 error value-out-of-range"),
+        ("CALC_MEASURED_SKEW AC=1 BD=2", "1:0-18 error missing-value"),
+        ("SKEW_PROFILE", "1:0-12 error missing-value"),
+        ("SKEW_PROFILE SAVE=x", "1:0-12 info ignored-setting"),
+        ("BED_MESH_PROFILE REMOVE=x", "1:0-16 info ignored-setting"),
+        ("BED_MESH_CALIBRATE", "1:0-18 blocking unsupported-command"),
+    ] {
+        let read = read(line);
+        assert_eq!((read.said(), read.actions.len()), (vec![said.to_owned()], 0), "{line}");
+    }
 }

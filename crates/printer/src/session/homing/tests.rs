@@ -18,7 +18,7 @@ impl Table {
         let text = text.replacen("homing_retract_dist: 5", &format!("homing_retract_dist: {retract}"), 1);
         let config = config::parse(&text).0.expect("a machine");
         let board = Board::for_tests(&config);
-        let homing = AxisHoming::new(0, &config.steppers[0], &board).expect("an axis");
+        let homing = AxisHoming::new(0, &config, &board).expect("an axis");
         Self { board, homing, now: Seconds::ZERO }
     }
 
@@ -28,7 +28,7 @@ impl Table {
 
     fn position(&mut self, steps: i32) -> Result<(), PrinterError> {
         assert_eq!(self.poll(true), Ok(Wish::Wait));
-        self.homing.on_position(self.homing.stepper, steps, self.now)
+        self.homing.on_position(self.homing.movers[0].oid, steps, self.now)
     }
 
     fn trigger(&mut self, can_trigger: bool, reason: u8) -> Result<(), PrinterError> {
@@ -100,7 +100,7 @@ fn it_comes_twice_the_second_time_from_near_and_slowly() {
     assert_eq!((second.from_mm, second.to_mm, second.speed.0), (10.0, 0.0, 10.0));
     table.found(-3101).unwrap();
     assert_eq!(table.poll(true), Ok(Wish::Done));
-    assert_eq!((table.homing.steps, table.homing.position_mm()), (3200 + 401, 0.0));
+    assert_eq!((table.homing.steps()[0], table.homing.position_mm()), (3200 + 401, 0.0));
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn an_approach_that_the_time_out_ends_goes_on_from_there() {
     assert_eq!((slow.from_mm, slow.to_mm, slow.speed.0), (7.0, 0.0, 10.0));
     // The switch is closed without a further step, but there were some.
     table.found(-3740).unwrap();
-    assert_eq!((table.poll(true), table.homing.steps), (Ok(Wish::Done), 4000 + 240));
+    assert_eq!((table.poll(true), table.homing.steps()[0]), (Ok(Wish::Done), 4000 + 240));
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn answers_for_others_and_at_other_times_change_nothing() {
     table.homing.on_trigger(77, false, REASON_ENDSTOP, table.now, &mut table.board).unwrap();
     table.homing.on_endstop(77, false, true, table.now, &mut table.board).unwrap();
     table.homing.on_position(77, 5, table.now).unwrap();
-    table.homing.on_position(table.homing.stepper, 5, table.now).unwrap();
+    table.homing.on_position(table.homing.movers[0].oid, 5, table.now).unwrap();
     assert!(matches!(table.homing.stage, Stage::Approach { .. }));
 }
 
@@ -270,4 +270,119 @@ fn a_cancelled_approach_is_stopped_once_it_moves() {
     table.trigger(false, REASON_HOST).unwrap();
     assert_eq!(table.poll(false), Ok(Wish::Abandon));
     assert_eq!(table.poll(true), Ok(Wish::Cancelled));
+}
+
+/// A delta on its way up.
+fn towers() -> Table {
+    let config = config::parse(config::SMALL_DELTA).0.expect("a delta");
+    let board = Board::for_tests(&config);
+    let homing = AxisHoming::new(0, &config, &board).expect("towers");
+    Table { board, homing, now: Seconds::ZERO }
+}
+
+impl Table {
+    fn positions(&mut self, steps: [i32; 3]) -> Result<(), PrinterError> {
+        assert_eq!(self.poll(true), Ok(Wish::Wait));
+        let oids: Vec<u8> = self.homing.movers.iter().map(|mover| mover.oid).collect();
+        oids.into_iter().zip(steps).try_for_each(|(oid, at)| self.homing.on_position(oid, at, self.now))
+    }
+
+    fn tower(&mut self, tower: u8, reason: u8) -> Result<(), PrinterError> {
+        self.homing.on_trigger(TRIGGER + 2 * tower, false, reason, self.now, &mut self.board)
+    }
+
+    fn towers_approach(&mut self, steps: [i32; 3]) -> HomingMove {
+        self.positions(steps).unwrap();
+        let Ok(Wish::Move(wanted)) = self.poll(true) else { panic!() };
+        let start = self.board.clock_at(self.now);
+        self.homing.run_started(start, &mut self.board, self.now);
+        wanted
+    }
+}
+
+#[test]
+fn towers_run_up_together_and_each_stops_at_its_own_switch() {
+    let mut table = towers();
+    let up = table.towers_approach([10, 20, 30]);
+    assert_eq!(table.homing.axes, [true; 3]);
+    assert!(up.to_mm == 300.0 && up.from_mm < -300.0, "{up:?}");
+    for tower in [2, 0] {
+        table.tower(tower, REASON_ENDSTOP).unwrap();
+        // What is heard of it once more changes nothing, and the last one is still on its way.
+        table.tower(tower, REASON_HOST).unwrap();
+        assert_eq!(table.poll(false), Ok(Wish::Wait));
+    }
+    table.tower(1, REASON_ENDSTOP).unwrap();
+    assert_eq!(table.poll(false), Ok(Wish::Abandon));
+    table.positions([3210, 4020, 2030]).unwrap();
+    table.back_off();
+    for (tower, left) in [(0, true), (1, true), (2, false)] {
+        table.homing.on_endstop(ENDSTOP + 2 * tower, false, false, table.now, &mut table.board).unwrap();
+        assert_eq!(table.homing.second, !left);
+    }
+    table.towers_approach([2810, 3620, 1630]);
+    for tower in [0, 1, 2] {
+        table.tower(tower, REASON_ENDSTOP).unwrap();
+    }
+    assert_eq!(table.poll(false), Ok(Wish::Abandon));
+    table.positions([3211, 4021, 2031]).unwrap();
+    assert_eq!(table.poll(true), Ok(Wish::Done));
+    assert_eq!(table.homing.steps(), [3200 + 401, 4000 + 401, 2000 + 401, 0]);
+}
+
+#[test]
+fn a_tower_that_does_not_move_or_find_its_switch_is_an_error() {
+    let mut table = towers();
+    table.towers_approach([0; 3]);
+    table.tower(0, REASON_ENDSTOP).unwrap();
+    assert_eq!(table.tower(1, REASON_HOST).unwrap_err().code, ErrorCode::EndstopNotReached);
+    let mut table = towers();
+    table.homing.second = true;
+    table.towers_approach([0; 3]);
+    for tower in [0, 1, 2] {
+        table.tower(tower, REASON_ENDSTOP).unwrap();
+    }
+    assert_eq!(table.poll(false), Ok(Wish::Abandon));
+    assert_eq!(table.positions([400, 0, 400]).unwrap_err().code, ErrorCode::EndstopBeforeMove);
+}
+
+#[test]
+fn motors_that_move_an_axis_together_stop_together() {
+    let text = include_str!("../../../../../samples/corexy.cfg");
+    let config = config::parse(text).0.expect("a machine");
+    let board = Board::for_tests(&config);
+    for (axis, motors) in [(0, vec![0, 1]), (1, vec![0, 1]), (2, vec![2])] {
+        let homing = AxisHoming::new(axis, &config, &board).expect("an axis");
+        assert_eq!(homing.stops.len(), 1);
+        assert_eq!(homing.movers.iter().map(|mover| mover.motor).collect::<Vec<_>>(), motors);
+        assert!(homing.movers.iter().all(|mover| mover.stop == 0));
+    }
+}
+
+#[test]
+fn what_motors_that_stopped_apart_have_moved_goes_back() {
+    let text =
+        include_str!("../../../../../samples/corexy.cfg").replacen("retract_dist: 5", "retract_dist: 0", 1);
+    let config = config::parse(&text).0.expect("a machine");
+    // The second motor's direction pin is inverted: it counts down where it goes forward.
+    for (ends, by) in [([-800, 800], 0.0), ([-801, 800], -0.5), ([-800, 803], 1.5)] {
+        let board = Board::for_tests(&config);
+        let homing = AxisHoming::new(0, &config, &board).expect("an axis");
+        let mut table = Table { board, homing, now: Seconds::ZERO };
+        table.towers_approach([0; 3]);
+        table.trigger(false, REASON_ENDSTOP).unwrap();
+        assert_eq!(table.poll(false), Ok(Wish::Abandon));
+        table.positions([ends[0], ends[1], 0]).unwrap();
+        if by == 0.0 {
+            assert_eq!(table.poll(true), Ok(Wish::Done));
+            continue;
+        }
+        let Ok(Wish::Straighten(drift)) = table.poll(true) else { panic!("{:?}", table.poll(true)) };
+        assert_eq!((drift[0], drift[2]), (0.0, 0.0));
+        assert!((drift[1] - by * 0.0125).abs() < 1e-12, "{drift:?}");
+        table.homing.run_started(Ticks(0), &mut table.board, table.now);
+        assert_eq!(table.poll(false), Ok(Wish::Wait));
+        assert_eq!(table.poll(true), Ok(Wish::Wait));
+        assert_eq!(table.poll(true), Ok(Wish::Done));
+    }
 }

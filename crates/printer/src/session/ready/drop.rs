@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     journal::MotorQueue,
-    machine::{self, MOTORS},
+    machine::{MOTORS, Motors},
     session::{
         board::FAN_LANE,
         event::Event,
@@ -181,8 +181,7 @@ impl Ready {
 
     /// The queue has been dropped: the machine stands where its motors' counts say.
     pub(super) fn stand_at(&mut self, counts: &[i32; MOTORS], now: Seconds) {
-        let steps_mm = machine::step_distances(&self.config).map(|distance| distance.0);
-        let position = self.stream.position_of(*counts, steps_mm, &self.board);
+        let position = self.stream.position_of(*counts, &Motors::new(&self.config), &self.board);
         self.planner.abandon_run();
         self.board.link.forget_motion(FAN_LANE as u8);
         if self.stream.abandon(&mut self.board) {
@@ -191,7 +190,11 @@ impl Ready {
         for (motor, &count) in counts.iter().enumerate() {
             self.stream.set_count(motor, count);
         }
-        self.planner.stand_at(position);
+        match position {
+            Some(position) => self.planner.stand_at(position),
+            // Counts that no machine can have: where the head is shows only when it is homed.
+            None => (0..3).for_each(|axis| self.planner.guard.set_homed(axis, false)),
+        }
         self.console.clear();
         self.planner.correct(&mut self.console.source);
         self.thermal.forget_fan_orders();

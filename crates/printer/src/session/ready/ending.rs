@@ -7,6 +7,7 @@ use crate::{
     error::{Ended, ErrorCode, PrinterError},
     journal::MovedBy,
     planner::{ExtrusionPermit, Planner},
+    reach::Reach,
     session::{
         event::Event,
         job::{Job, JobState, JobStatus, Paused, RETURN_FEED, Retracted},
@@ -183,7 +184,8 @@ impl Ready {
         let here = self.planner.position();
         let [x, y, z] =
             core::array::from_fn(|axis| if was_homed[axis] { position[axis] } else { here[axis] });
-        let (up, e) = (here[2].max(z), here[3]);
+        let up = self.across([x, y], here[2].max(z), z)?;
+        let e = here[3];
         for to in [[here[0], here[1], up, e], [x, y, up, e], [x, y, z, e]] {
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
         }
@@ -195,6 +197,16 @@ impl Ready {
             }
         }
         Ok(())
+    }
+
+    /// How high the head can go across to a place: this high, or, on machines that reach less up there, as high as it
+    /// goes, above `floor`.
+    pub(super) fn across(&self, to: [f64; 2], up: f64, floor: f64) -> Result<f64, PrinterError> {
+        let [x, y, ..] = self.planner.position();
+        Reach::new(&self.config).across([x, y], to, up, floor).ok_or_else(|| {
+            let detail = format!("there is no way to X {:.3} Y {:.3} above Z {floor:.3} mm", to[0], to[1]);
+            PrinterError::new(ErrorCode::MoveOutOfRange, detail)
+        })
     }
 
     /// What is done once the machine is at rest: a job that was told to stop has stopped, and a machine that nobody
@@ -231,6 +243,7 @@ impl Ready {
             Ok(aside) => aside,
             Err(error) => return self.source_failed(error, now),
         };
+        aside.set_same_transform(&self.planner);
         aside.stand_at(position);
         (0..3).for_each(|axis| aside.guard.set_homed(axis, homed[axis]));
         let could_extrude = self.extrusion_permit() == ExtrusionPermit::Allowed;

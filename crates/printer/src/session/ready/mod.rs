@@ -383,8 +383,14 @@ impl Ready {
             TimedAction::Object(object) => self.events.push(Event::Object(object)),
             TimedAction::ReportTemperatures => self.events.push(Event::Message(self.thermal.describe())),
             TimedAction::ReportPosition => {
-                let [x, y, z, e] = self.planner.position();
-                self.events.push(Event::Message(format!("X:{x:.3} Y:{y:.3} Z:{z:.3} E:{e:.3}")));
+                let [x, y, z, e] = self.planner.gcode_position();
+                let text = format!("X:{x:.3} Y:{y:.3} Z:{z:.3} E:{e:.3}");
+                let [x, y, z, _] = self.planner.position();
+                self.events.push(Event::Message(if self.planner.transform().is_identity() {
+                    text
+                } else {
+                    format!("{text} (motors X:{x:.3} Y:{y:.3} Z:{z:.3})")
+                }));
             }
         }
     }

@@ -6,10 +6,11 @@ use units::{Mm, MmPerS, Seconds};
 
 use super::{Failure, Ready, hold::Purpose};
 use crate::{
-    error::PrinterError,
+    error::{ErrorCode, PrinterError},
     journal::MotorQueue,
-    machine::{self, EXTRUDER, MOTORS},
+    machine::{EXTRUDER, MOTORS, Motors},
     planner::{ExtrusionPermit, Planner},
+    reach::Reach,
     session::{
         event::Event,
         job::{JobState, Paused, RETURN_FEED, Retracted},
@@ -21,6 +22,12 @@ use crate::{
 const RETRACT: Mm = Mm(1.0);
 /// … and so fast.
 const RETRACT_SPEED: MmPerS = MmPerS(20.0);
+
+/// Counts that no machine can have.
+fn impossible() -> Failure {
+    let detail = "the motors' counts belong to no place of the head";
+    Failure::Stop(PrinterError::new(ErrorCode::Internal, detail))
+}
 
 impl Ready {
     /// The board has dropped the run that was being made, and its motors stand where they say: the job is put aside, and
@@ -36,13 +43,14 @@ impl Ready {
         let cut = self.stream.cut(queues, at, &mut self.board).map_err(Failure::Stop)?;
         self.lease.forget();
         self.events.push(Event::RunBroken { at });
-        let steps_mm = machine::step_distances(&self.config).map(|distance| distance.0);
         let counts = queues.map(|queue| queue.position);
         let position = match &cut {
             Some(cut) => {
                 self.thermal.forget_fan_orders();
                 self.set_fan_now(cut.left.fan, now);
-                self.stream.position_of(counts, steps_mm, &self.board)
+                self.stream
+                    .position_of(counts, &Motors::new(&self.config), &self.board)
+                    .ok_or_else(impossible)?
             }
             None => self.planner.position(),
         };
@@ -51,6 +59,7 @@ impl Ready {
         self.diary.park(queues, cut.is_some(), at, retract, &mut self.board);
         let homed = self.planner.guard.homed();
         let mut aside = Planner::new(&self.config, self.board.clock).map_err(Failure::Stop)?;
+        aside.set_same_transform(&self.planner);
         aside.stand_at(position);
         (0..3).for_each(|axis| aside.guard.set_homed(axis, homed[axis]));
         if cut.is_none() {
@@ -108,15 +117,20 @@ impl Ready {
             self.planner.push_raw_move(to, speed.unwrap_or(RETRACT_SPEED), gcode::LineNumber(0))?;
         }
         if homed[2] {
-            let z_max = self.config.steppers[2].position_max.0;
-            to[2] = (to[2] + self.config.printer.pause_lift.0).min(z_max).max(to[2]);
+            let [x, y, z, _] = to;
+            let reach = Reach::new(&self.config);
+            to[2] = reach.lifted([x, y, z], self.config.printer.pause_lift.0);
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
             for (axis, park) in self.config.printer.pause_position.into_iter().enumerate() {
-                let stepper = &self.config.steppers[axis];
                 if let Some(park) = park.filter(|_| homed[axis]) {
-                    to[axis] = park.0.clamp(stepper.position_min.0, stepper.position_max.0);
+                    to[axis] = park.0;
                 }
             }
+            let [park_x, park_y] = reach.clamped([to[0], to[1]]);
+            let up = to[2];
+            // So high up it may be too far away.
+            let parks = reach.judge_way([x, y, up], [park_x, park_y, up]).is_ok();
+            [to[0], to[1]] = if parks { [park_x, park_y] } else { [x, y] };
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
         }
         Ok(())

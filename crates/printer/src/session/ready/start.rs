@@ -14,6 +14,7 @@ use crate::{
     journal::Input,
     machine::EXTRUDER,
     planner::{ExtrusionPermit, Planner, Skip, Skipped},
+    reach::Reach,
     session::{
         event::Event,
         job::{Job, JobState, Paused, RETURN_FEED, Start, Way},
@@ -38,6 +39,7 @@ impl Ready {
     /// Has a job begin with a line. The planner that is at hand goes on moving the machine until then.
     pub(in crate::session) fn begin_at(&mut self, job: &mut Job, line: u32) -> Result<(), PrinterError> {
         let mut planner = Box::new(Planner::new(&self.config, self.board.clock)?);
+        planner.set_same_transform(&self.planner);
         planner.begin_job(&mut job.source);
         let endstops = self.config.steppers.each_ref().map(|stepper| stepper.position_endstop.0);
         job.skip = Some(Skip::new(line, endstops));
@@ -176,6 +178,10 @@ impl Ready {
     }
 
     fn go(&mut self, to: [f64; 4], feed: MmPerS) -> Result<(), PrinterError> {
+        let place = |[x, y, z, _]: [f64; 4]| [x, y, z];
+        Reach::new(&self.config)
+            .judge_way(place(self.planner.position()), place(to))
+            .map_err(|detail| PrinterError::new(ErrorCode::MoveOutOfRange, detail))?;
         self.planner.push_raw_move(to, feed, LineNumber(0))
     }
 
@@ -192,11 +198,13 @@ impl Ready {
             self.events.push(Event::Message(text.into()));
             return Ok(());
         };
-        let up = z.max(start.clear_z);
+        let up = self.across([x, y], z.max(start.clear_z), start.clear_z)?;
+        let [here_x, here_y, ..] = self.planner.position();
         let retraction = self.config.firmware_retraction.as_ref();
         let (pull_mm, speed) =
             retraction.map_or((PULL_MM, PULL_SPEED), |it| (it.retract_length.0, it.retract_speed));
         let pulled = pull_mm.max(start.retracted).min(extruder.max_extrude_only_distance.0);
+        self.go([here_x, here_y, up, e], RETURN_FEED)?;
         self.go([x, y, up, e], RETURN_FEED)?;
         self.go([x, y, up, e + prime_mm], PRIME_SPEED)?;
         self.go([x, y, up, e + prime_mm - pulled], speed)?;
@@ -212,11 +220,7 @@ impl Ready {
         let is_beside = |place: &[f64; 2]| {
             (0..2).any(|axis| place[axis] < low[axis] - ASIDE_MM || place[axis] > high[axis] + ASIDE_MM)
         };
-        let [x, y] = [0, 1].map(|axis: usize| {
-            let stepper = &self.config.steppers[axis];
-            [stepper.position_min.0 + FROM_ENDS_MM, stepper.position_max.0 - FROM_ENDS_MM]
-        });
-        let corners = [0, 1, 2, 3].map(|at: usize| [x[at % 2], y[at / 2]]);
+        let corners = Reach::new(&self.config).corners(FROM_ENDS_MM);
         let away = |place: &[f64; 2]| libm::hypot(place[0] - here[0], place[1] - here[1]);
         core::iter::once(here)
             .chain(corners)
@@ -230,7 +234,8 @@ impl Ready {
         let Some(paused) = self.job.as_ref().and_then(|job| job.paused.as_ref()) else { return Ok(()) };
         let [x, y, z, _] = paused.position;
         let [here_x, here_y, here_z, e] = self.planner.position();
-        let up = here_z.max(z).max(start.clear_z);
+        let floor = z.max(start.clear_z);
+        let up = self.across([x, y], here_z.max(floor), floor)?;
         for to in [[here_x, here_y, up, e], [x, y, up, e], [x, y, z, e]] {
             self.go(to, RETURN_FEED)?;
         }

@@ -8,9 +8,9 @@ use units::{Clock32, Seconds, Ticks};
 use super::{Ready, hold::Purpose, rate::Rate, take_up::Rest};
 use crate::{
     config::PrinterConfig,
-    error::PrinterError,
+    error::{ErrorCode, PrinterError},
     journal::{BoardQueue, Continuation, Parked, TimedDue},
-    machine::{self, EXTRUDER, MOTORS},
+    machine::{self, EXTRUDER, Motors},
     planner::{Planner, TimedAction},
     session::{
         board::Board,
@@ -32,26 +32,31 @@ impl Ready {
         options: JobOptions,
         now: Seconds,
     ) -> Result<Self, (Box<Board>, PrinterError)> {
-        let steps_mm = machine::step_distances(&config).map(|distance| distance.0);
+        let motors = Motors::new(&config);
         let inverted = board.layout.steppers.map(|oids| oids.is_some_and(|oids| oids.invert_dir));
-        let signed = |motor: usize, steps: i32| if inverted[motor] { -steps } else { steps };
-        let position: [f64; MOTORS] = core::array::from_fn(|motor| {
-            taken.position_at_start[motor] + f64::from(taken.made[motor]) * steps_mm[motor]
-        });
+        let signed = |motor: usize, steps: i32| if inverted[motor] { steps.wrapping_neg() } else { steps };
         let counts = queue.motors.map(|motor| motor.position);
-        let here: [f64; MOTORS] = core::array::from_fn(|motor| {
-            let moved = counts[motor].wrapping_sub(parked.motors[motor].position);
-            position[motor] + f64::from(signed(motor, moved)) * steps_mm[motor]
+        let since = core::array::from_fn(|motor| {
+            signed(motor, counts[motor].wrapping_sub(parked.motors[motor].position))
         });
+        let places = motors
+            .moved(&taken.position_at_start, taken.made)
+            .and_then(|position| Some((position, motors.moved(&position, since)?)));
+        let Some((position, here)) = places else {
+            let detail = "the motors' counts belong to no place of the head";
+            return Err((Box::new(board), PrinterError::new(ErrorCode::ContinuationRefused, detail)));
+        };
         let planner = match Planner::new(&config, board.clock) {
             Ok(planner) => planner,
             Err(error) => return Err((Box::new(board), error)),
         };
+        let extruder_step_mm = machine::step_distances(&config)[EXTRUDER].0;
         let mut rest = Rest::of(&mut taken);
         let mut diary = Diary::default();
         diary.take_up(&taken, now);
         let mut ready = Self::with_planner(config, board, planner, now);
         (ready.diary, ready.rate) = (diary, Rate::unknown());
+        ready.planner.set_same_transform(&taken.planner);
         ready.planner.stand_at(here);
         let homed = taken.planner.guard.homed();
         (0..3).for_each(|axis| ready.planner.guard.set_homed(axis, homed[axis]));
@@ -102,7 +107,7 @@ impl Ready {
             start: None,
             rest: None,
             cut: Some(Box::new(cut)),
-            retracted: retracted(parked, position[EXTRUDER], here[EXTRUDER], steps_mm[EXTRUDER]),
+            retracted: retracted(parked, position[EXTRUDER], here[EXTRUDER], extruder_step_mm),
         });
         ready.job = Some(job);
         ready.hold_motion(Purpose::Parked, now);

@@ -3,19 +3,22 @@
 use std::collections::VecDeque;
 
 use gcode::{Heater as HeaterName, LineNumber, Wait as HeatWait};
-use units::{Celsius, Seconds};
+use units::{Celsius, MmPerS, Seconds};
 
 use super::{Failure, Ready};
 use crate::{
     error::{ErrorCode, PrinterError},
     journal::MovedBy,
-    machine,
+    machine::{self, MOTORS},
     planner::{Barrier, ExtrusionPermit},
     session::{
         event::Event,
         homing::{AxisHoming, Wish},
     },
 };
+
+/// A step or two, to put axes right that homing has moved.
+const STRAIGHTEN_SPEED: MmPerS = MmPerS(5.0);
 
 /// Something that has to be over before the G-code goes on.
 #[derive(Debug)]
@@ -167,6 +170,10 @@ impl Ready {
             Ok(Wish::Move(wanted)) => {
                 if at_rest {
                     // A stand-in: where it is shows only at the endstop.
+                    let (axes, home_mm) = (homing.axes, homing.home_mm);
+                    for axis in (0..3).filter(|&axis| axes[axis]) {
+                        self.planner.set_axis(axis, home_mm[axis], false);
+                    }
                     self.planner.set_axis(axis, wanted.from_mm, false);
                     let mut to = self.planner.position();
                     to[axis] = wanted.to_mm;
@@ -178,24 +185,59 @@ impl Ready {
                 }
             }
             Ok(Wish::Abandon) => {
-                let position_mm = homing.position_mm();
+                let (axes, home_mm) = (homing.axes, homing.home_mm);
                 self.break_run(now);
-                self.planner.set_axis(axis, position_mm, false);
+                for axis in (0..3).filter(|&axis| axes[axis]) {
+                    self.planner.set_axis(axis, home_mm[axis], false);
+                }
+            }
+            Ok(Wish::Straighten(by)) => {
+                if at_rest {
+                    self.straighten(by, now);
+                }
             }
             Ok(Wish::GoesOn) => {
                 let text = "homing was stopped by the board, which heard nothing for a moment: it goes on from there";
                 self.events.push(Event::Message(text.into()));
             }
             Ok(Wish::Done) => {
-                let (position_mm, steps) = (homing.position_mm(), homing.steps);
-                self.planner.set_axis(axis, position_mm, true);
-                self.events.push(Event::Homed { axis, position_mm, steps });
+                let (axes, home_mm, steps) = (homing.axes, homing.home_mm, homing.steps());
+                for at in (0..3).filter(|&at| axes[at]) {
+                    let position_mm = home_mm[at];
+                    self.planner.set_axis(at, position_mm, true);
+                    // Of towers each tells of its own.
+                    let own = |motor: usize| if axes == [true; 3] && motor != at { 0 } else { steps[motor] };
+                    let steps = core::array::from_fn(own);
+                    self.events.push(Event::Homed { axis: at, position_mm, steps });
+                }
                 self.home_next();
             }
             Ok(Wish::Cancelled) => {
+                // Motors that move another axis as well may have left it a step or two off.
+                let lost = self.coupled(core::array::from_fn(|it| it == axis));
+                (0..3).filter(|&axis| lost[axis]).for_each(|axis| self.planner.guard.set_homed(axis, false));
                 self.wait = Wait::Nothing;
                 self.planner.correct(&mut self.console.source);
             }
+            Err(error) => self.homing_failed(error, now),
+        }
+    }
+
+    /// Homing has moved axes by so much that are where they are: they go back.
+    fn straighten(&mut self, by: [f64; 3], now: Seconds) {
+        let Wait::Homing { axis: homing, .. } = &mut self.wait else { return };
+        let homed = self.planner.guard.homed();
+        let to = self.planner.position();
+        let mut from = to;
+        for axis in (0..3).filter(|&axis| homed[axis]) {
+            from[axis] += by[axis];
+        }
+        if from == to {
+            return homing.is_straight();
+        }
+        self.planner.stand_at(from);
+        match self.planner.push_raw_move(to, STRAIGHTEN_SPEED, LineNumber(0)) {
+            Ok(()) => drop(self.planner.finish_run()),
             Err(error) => self.homing_failed(error, now),
         }
     }
@@ -214,7 +256,7 @@ impl Ready {
         let (mut remaining, axes, line) = (core::mem::take(remaining), *axes, *line);
         self.wait = Wait::Nothing;
         while let Some(axis) = remaining.pop_front() {
-            if let Some(homing) = AxisHoming::new(axis, &self.config.steppers[axis], &self.board) {
+            if let Some(homing) = AxisHoming::new(axis, &self.config, &self.board) {
                 self.wait = Wait::Homing { axis: Box::new(homing), remaining, axes, line };
                 return;
             }
@@ -227,14 +269,23 @@ impl Ready {
         source.unwrap_or(&mut self.console.source).interpreter.set_axes(x, y, z);
     }
 
-    /// Has axes homed, one after the other.
+    /// Has axes homed, one after the other, or all together.
     pub(super) fn begin_homing(&mut self, axes: [bool; 3], line: LineNumber) {
+        let axes = machine::homed_together(&self.config, axes);
         let mut remaining: VecDeque<usize> = (0..3).filter(|&axis| axes[axis]).collect();
+        if machine::homed_together(&self.config, [true, false, false]) == [true; 3] {
+            remaining.truncate(1);
+        }
         if let Some(axis) = remaining.pop_front()
-            && let Some(homing) = AxisHoming::new(axis, &self.config.steppers[axis], &self.board)
+            && let Some(homing) = AxisHoming::new(axis, &self.config, &self.board)
         {
             self.wait = Wait::Homing { axis: Box::new(homing), remaining, axes, line };
         }
+    }
+
+    /// These axes, and all that motors of theirs move as well. Those motors have the same numbers.
+    fn coupled(&self, axes: [bool; MOTORS]) -> [bool; MOTORS] {
+        machine::geometry(&self.config).coupled(axes)
     }
 
     pub(super) fn homing_failed(&mut self, mut error: PrinterError, now: Seconds) {
@@ -242,8 +293,12 @@ impl Ready {
             let axis = axis.axis;
             error = error.at_line(line.0);
             self.break_run(now);
-            let position = self.planner.position()[axis];
-            self.planner.set_axis(axis, position, false);
+            // Motors that move another axis as well have left nobody knows where.
+            let lost = self.coupled(core::array::from_fn(|it| it == axis));
+            let position = self.planner.position();
+            for axis in (0..3).filter(|&axis| lost[axis]) {
+                self.planner.set_axis(axis, position[axis], false);
+            }
         }
         self.wait = Wait::Nothing;
         self.source_failed(error, now);
@@ -290,6 +345,7 @@ impl Ready {
                     // Without current it moves as it does without power, and its driver keeps its place.
                     self.note_height(self.planner.position()[2], MovedBy::Nobody);
                 }
+                let motors = self.coupled(motors);
                 self.stream.disable(motors, &mut self.board, now);
                 for axis in (0..3).filter(|&axis| motors[axis]) {
                     self.planner.guard.set_homed(axis, false);

@@ -1,6 +1,8 @@
 //! Exact motion, and every way to miss it.
 
 use super::*;
+use gcode::{Action, Interpreter, LineNumber, Settings};
+use units::Mm;
 
 const CLOCK: Hertz = Hertz(1_000_000);
 const STEP_MM: f64 = 0.0125;
@@ -16,7 +18,7 @@ fn span(line: u32, start: u64, end: u64, from: [f64; 2], to: [f64; 2]) -> Span {
         end: Ticks(end),
         from: [from[0], from[1], 0.0, 0.0],
         to: [to[0], to[1], 0.0, 0.0],
-        bulge_mm: 0.0,
+        arc: None,
         homing: false,
     }
 }
@@ -156,14 +158,33 @@ fn pulses_between_lines_are_strays() {
 }
 
 #[test]
-fn an_arc_counts_with_its_bulge() {
-    let mut chord = span(4, 0, 1000, [0.0, 0.0], [STEP_MM, 0.0]);
-    chord.bulge_mm = 0.004;
-    let mut check = check();
-    check.expect(&chord).unwrap();
-    check.pulse(0, Ticks(500), 1);
-    check.finish();
-    assert!((check.worst().distance_mm - 0.004).abs() < 1e-12);
+fn an_arc_is_measured_against_itself() {
+    // A sixth of a circle as one piece: its middle is 0.13 mm from the chord.
+    let mut words = Interpreter::new(Settings::default());
+    let (mut actions, mut found) = (Vec::new(), Vec::new());
+    words.line(LineNumber(1), b"G1 X1 F600", &mut actions, &mut found);
+    words.line(LineNumber(2), b"G3 X0.5 Y0.86602540378 I-1 J0", &mut actions, &mut found);
+    let Some(Action::Arc(arc)) = actions.get(1) else { panic!("{actions:?} {found:?}") };
+    let mut pieces = arc.chords(Mm(1.0));
+    let distance = |place: [f64; 2]| {
+        let mut check = check();
+        let mut pieces = pieces.clone();
+        let mut start = 0;
+        while let Some(piece) = pieces.next_piece() {
+            let [from, to] = [piece.chord.from, piece.chord.to].map(|at| [at.x, at.y]);
+            let way = ArcWay::new(&piece);
+            check.expect(&Span { arc: Some(way), ..span(2, start, start + 100_000, from, to) }).unwrap();
+            start += 100_000;
+        }
+        check.set_position(1, place[1]);
+        check.set_position(0, place[0] - STEP_MM);
+        check.pulse(0, Ticks(50_000), 1);
+        check.worst().distance_mm
+    };
+    let (sin, cos) = libm::sincos(0.4);
+    assert!(distance([cos, sin]) < 1e-9);
+    assert!((distance([1.05 * cos, 1.05 * sin]) - 0.05).abs() < 1e-9);
+    assert!(pieces.next_piece().is_some());
 }
 
 #[test]

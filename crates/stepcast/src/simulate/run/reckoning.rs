@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use printer::machine::MOTOR_NAMES;
 use units::Ticks;
 use virtual_printer::State;
 
@@ -97,7 +96,7 @@ fn motors(observer: &Observer, tally: &Tally, state: &State) -> BTreeMap<&'stati
         lost_steps: state.motors.get(motor).map_or(0, |view| view.lost.0),
         end_position_mm: tally.path.position_mm(motor),
     };
-    MOTOR_NAMES.iter().enumerate().map(|(motor, &name)| (name, of(motor))).collect()
+    observer.names.iter().enumerate().map(|(motor, &name)| (name, of(motor))).collect()
 }
 
 /// What is wrong with the pulses of a print that the session takes for done.
@@ -110,11 +109,13 @@ fn wrong(
     if let Some(mismatch) = &observer.mismatch {
         return Some(mismatch.clone());
     }
-    for (index, name) in MOTOR_NAMES.iter().enumerate() {
+    for (index, name) in observer.names.iter().enumerate() {
         let Motor { planned_steps, counted_steps, lost_steps, end_position_mm } = &motors[name];
         if observer.is_filtered(index) {
-            let end = observer.end.map_or(*end_position_mm, |end| end[index]);
-            if (end_position_mm - end).abs() > observer.step_distance_mm[index] {
+            let end = observer.end.map_or(*end_position_mm, |end| tally.path.motor_mm(index, end));
+            // Where motors that stop together at an endstop stopped, each is rounded once more.
+            let off_max = observer.step_distance_mm[index] * if tally.path.is_coupled() { 1.5 } else { 1.0 };
+            if (end_position_mm - end).abs() > off_max {
                 return Some(format!("{name} stands at {end_position_mm} mm, the print ends at {end} mm"));
             }
         } else if planned_steps != counted_steps {
