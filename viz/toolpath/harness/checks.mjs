@@ -40,7 +40,6 @@ const emptied = (page, act) =>
   page.evaluate(
     ([body]) => {
       window.harness.frames.length = 0;
-      window.harness.seen = 0;
       return new Function('host', body)(window.harness.host);
     },
     [act],
@@ -148,7 +147,6 @@ async function comesBack(page) {
       lose.loseContext();
       await until('contextLost');
       frames.length = 0;
-      window.harness.seen = 0;
       lose.restoreContext();
       await until('contextRestored');
     });

@@ -1,7 +1,5 @@
 // Compares pictures, and takes them when nothing moves any more.
 
-/** Nothing is drawn for so long: the picture is done. */
-const QUIET_MS = 250;
 /** A colour's channel may differ by so much. */
 const CHANNEL_MAX = 40;
 
@@ -39,31 +37,24 @@ export async function drawn(page, name, theme) {
   await page.evaluate(
     ([case_, shade]) => {
       window.harness.latest.delete('ranges');
-      window.harness.frames.length = 0;
-      window.harness.seen = 0;
       window.harness.show(case_, shade);
     },
     [name, theme],
   );
+  await page.waitForFunction(() => window.harness.latest.get('ranges')?.isWhole, null, { timeout: 60_000 });
+  await page.evaluate(() => {
+    window.harness.frames.length = 0;
+    // Whatever was drawn before, something is drawn now.
+    window.harness.host.orbit(0, 0);
+  });
   return atRest(page);
 }
 
-/** A picture once all that was asked for is drawn; `harness.frames` must have been emptied when it was. */
+/** A picture once all that was asked for is drawn; `harness.frames` must have been emptied before it was asked for. */
 export async function atRest(page) {
-  await page.waitForFunction(
-    (quietMs) => {
-      const { harness } = window;
-      const { frames, latest } = harness;
-      if (!latest.get('ranges')?.isWhole || (frames.at(-1)?.kind ?? 'quick') === 'quick') return false;
-      if (harness.seen !== frames.length) {
-        harness.seen = frames.length;
-        harness.since = performance.now();
-      }
-      return performance.now() - harness.since > quietMs;
-    },
-    QUIET_MS,
-    { timeout: 60_000, polling: 50 },
-  );
+  await page.waitForFunction(() => window.harness.frames.some(({ more }) => !more), null, {
+    timeout: 60_000,
+  });
   return page.screenshot();
 }
 
