@@ -77,11 +77,12 @@ const steps = [
     commands: ['web', 'viz/toolpath'].map((folder) => packaged('vitest/vitest.mjs', 'run', '--root', folder)),
   },
   {
-    name: 'pictures of the 3D view',
+    name: 'the 3D view in a browser',
     absent: browserAbsent,
     commands: [
       packaged('vite/bin/vite.js', 'build', join('viz', 'toolpath', 'harness')),
       [process.execPath, join('viz', 'toolpath', 'harness', 'visual.mjs')],
+      [process.execPath, join('viz', 'toolpath', 'harness', 'checks.mjs')],
     ],
   },
   // Before the page, which takes them along.

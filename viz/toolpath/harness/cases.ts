@@ -141,6 +141,18 @@ export const CASES: Readonly<Record<string, Case>> = {
   'colour-layer-time': valueCase((host) => host.setColour('layerTime')),
   'colour-tool': valueCase((host) => host.setColour('tool')),
   'colour-object': valueCase((host) => host.setColour('object')),
+  // Half of the channels are missing: what they would say is not known.
+  'colour-partly': {
+    make: () => {
+      const made = values();
+      const words = made.channels.length / 2;
+      return { ...made, channels: made.channels.fill(0, words - (words % 4)) };
+    },
+    look: (host) => {
+      host.fit(near);
+      host.setColour('speed');
+    },
+  },
   'own-range': valueCase((host) => {
     host.setColour('speed');
     host.setColourRange('speed', [90, 110]);

@@ -110,6 +110,33 @@ export function mmPerPx(camera: CameraState, size: ViewSize): Mm {
   return (2 * camera.distanceMm * Math.tan(FIELD_OF_VIEW / 2)) / Math.max(size.height, 1);
 }
 
+/** A line of sight. */
+export interface Ray {
+  readonly fromMm: Vec3;
+  /** Of length 1. */
+  readonly way: Vec3;
+  /** Millimetres that a CSS pixel covers, for each millimetre of distance. */
+  readonly pixelAngle: number;
+}
+
+/** What a CSS pixel covers a millimetre away from the eye. */
+export const pixelAngle = (camera: CameraState, size: ViewSize): number =>
+  mmPerPx(camera, size) / eyeDistanceMm(camera);
+
+/** The line of sight through a point of the view, from its left top. */
+export function rayThrough(camera: CameraState, size: ViewSize, x: CssPx, y: CssPx): Ray {
+  const { eyeMm, right, up, forward } = eyeFrame(camera);
+  const scale = mmPerPx(camera, size);
+  const [dx, dy] = [(x - size.width / 2) * scale, (size.height / 2 - y) * scale];
+  const angle = pixelAngle(camera, size);
+  if (camera.projection === 'orthographic') {
+    return { fromMm: along(eyeMm, [dx, right], [dy, up]), way: forward, pixelAngle: angle };
+  }
+  const away = along([0, 0, 0], [camera.distanceMm, forward], [dx, right], [dy, up]);
+  const length = Math.sqrt(dot(away, away));
+  return { fromMm: eyeMm, way: along([0, 0, 0], [1 / length, away]), pixelAngle: angle };
+}
+
 /** Turns around the target as if the scene were dragged by (dx, dy) pixels, y downwards. */
 export function orbit(camera: CameraState, dx: CssPx, dy: CssPx): CameraState {
   const turned = (camera.azimuth - dx * RADIANS_PER_PX) % (2 * Math.PI);

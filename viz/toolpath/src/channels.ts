@@ -66,39 +66,39 @@ export class ChannelSum {
   #speedTime = 0;
   #flowTime = 0;
   #time = 0;
-  /** Where nothing lasts long enough to tell, or no time is known. */
-  #newest = new Uint32Array(WORDS_PER_CHANNELS);
+  #newestDynamics = 0;
+  #newestSet = 0;
   readonly #float = new Float32Array(1);
   readonly #bits = new Uint32Array(this.#float.buffer);
 
   add(words: Uint32Array, base: number): void {
-    for (let word = 0; word < WORDS_PER_CHANNELS; word++) this.#newest[word] = words[base + word] ?? 0;
+    const [speeds, dynamics, set] = [words[base] ?? 0, words[base + 1] ?? 0, words[base + 2] ?? 0];
     this.#bits[0] = words[base + 3] ?? 0;
+    this.#newestDynamics = dynamics;
+    this.#newestSet = set;
     const time = this.#float[0] ?? 0;
     if (!(time > 0 && time < Infinity)) return;
     this.#time += time;
-    this.#speedTime += time * channelUnits(words, base, 'meanSpeed');
-    this.#flowTime += time * channelUnits(words, base, 'flow');
-    this.#peak = Math.max(this.#peak, channelUnits(words, base, 'peakSpeed'));
-    this.#accel = Math.max(this.#accel, channelUnits(words, base, 'accel'));
+    this.#speedTime += time * (speeds >>> 16);
+    this.#flowTime += time * (set & 0xffff);
+    this.#peak = Math.max(this.#peak, speeds & 0xffff);
+    this.#accel = Math.max(this.#accel, dynamics & 0xffff);
   }
 
   /** Writes the sum's four words and begins anew. */
   take(out: Uint32Array, base: number): void {
-    out.set(this.#newest, base);
-    if (this.#time > 0) {
-      const [, feed = 0, set = 0] = this.#newest;
-      out[base] = this.#peak | (Math.round(this.#speedTime / this.#time) << 16);
-      out[base + 1] = this.#accel | (feed & 0xffff_0000);
-      out[base + 2] = Math.round(this.#flowTime / this.#time) | (set & 0xffff_0000);
-      this.#float[0] = this.#time;
-      out[base + 3] = this.#bits[0] ?? 0;
-    }
+    const time = Math.max(this.#time, Number.MIN_VALUE);
+    out[base] = this.#peak | (Math.round(this.#speedTime / time) << 16);
+    out[base + 1] = this.#accel | (this.#newestDynamics & 0xffff_0000);
+    out[base + 2] = Math.round(this.#flowTime / time) | (this.#newestSet & 0xffff_0000);
+    this.#float[0] = this.#time;
+    out[base + 3] = this.#bits[0] ?? 0;
     this.#peak = 0;
     this.#accel = 0;
     this.#speedTime = 0;
     this.#flowTime = 0;
     this.#time = 0;
-    this.#newest.fill(0);
+    this.#newestDynamics = 0;
+    this.#newestSet = 0;
   }
 }

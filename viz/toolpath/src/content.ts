@@ -7,6 +7,7 @@ import { TexelStore, VertexStore } from './chunks';
 import { Rough } from './coarse';
 import type { ColourRanges } from './colours';
 import { type Layer, LayerList } from './layers';
+import { Picker } from './pick';
 import { RangeFinder } from './ranges';
 import type { VertexHeader } from './vertex';
 
@@ -16,6 +17,7 @@ export class Content {
   /** As many as have come; never more than the vertices when all is there. */
   readonly channels = new TexelStore(0);
   readonly rough: Rough;
+  readonly picker: Picker;
   layers = new LayerList();
   readonly #finder = new RangeFinder();
   /** The vertex whose channels are looked at next. */
@@ -26,11 +28,14 @@ export class Content {
     this.header = header;
     this.store = new VertexStore(header);
     this.rough = new Rough(header);
+    this.picker = new Picker(this.store);
   }
 
   append(vertices: Uint32Array): void {
     this.store.append(vertices);
     this.rough.append(vertices);
+    // Now, piece by piece: all at once would hold up a frame.
+    this.picker.update();
     this.#finder.addVertices(vertices);
   }
 

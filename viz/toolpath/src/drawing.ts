@@ -6,7 +6,7 @@
  */
 import { Scene } from 'three';
 import { BedObjects } from './bed';
-import { type BoxMm, type CameraState, unionOf, type ViewSize } from './camera';
+import { type BoxMm, type CameraState, pixelAngle, unionOf, type ViewSize } from './camera';
 import type { ColourMode, ColourRanges } from './colours';
 import type { Content } from './content';
 import type { Drawn, Painter } from './frames';
@@ -18,7 +18,7 @@ import { featureMask, type Palette } from './palette';
 import { PathObjects } from './path';
 import { ALL_PRINTED } from './path_uniforms';
 import { type Shown, shownRanges } from './shown';
-import { pixelAngle, Stage, type Surface } from './stage';
+import { Stage, type Surface } from './stage';
 import { SurfaceObject } from './surface';
 import { FLAGS } from './vertex';
 

@@ -46,6 +46,8 @@ export interface FrameReport {
   readonly longestMs: Ms;
   /** From the beginning of the picture to its end. */
   readonly totalMs: Ms;
+  /** Another picture follows: this one is not what was asked for last, or not in full detail. */
+  readonly more: boolean;
 }
 
 /** After the last movement, until the full picture is begun. */
@@ -157,7 +159,7 @@ export class FrameLoop {
       const segments = this.#painter.drawQuick(this.#quickBudget.segments);
       this.#await(began, (elapsed) => {
         this.#quickBudget.measured(segments, elapsed);
-        this.#report({ kind: 'quick', segments, longestMs: elapsed, totalMs: elapsed });
+        this.#tell({ kind: 'quick', segments, longestMs: elapsed, totalMs: elapsed });
       });
     } else if (this.#fullWanted) {
       this.#drawSlice(began);
@@ -175,9 +177,7 @@ export class FrameLoop {
   }
 
   #awaitSmall(kind: 'patch' | 'overlay', began: Ms): void {
-    this.#await(began, (elapsed) =>
-      this.#report({ kind, segments: 0, longestMs: elapsed, totalMs: elapsed }),
-    );
+    this.#await(began, (elapsed) => this.#tell({ kind, segments: 0, longestMs: elapsed, totalMs: elapsed }));
   }
 
   #drawSlice(began: Ms): void {
@@ -200,8 +200,16 @@ export class FrameLoop {
       this.#longest = Math.max(this.#longest, elapsed);
       if (!complete) return;
       const totalMs = this.#clock.now() - this.#pictureBegan;
-      this.#report({ kind: 'full', segments: this.#pictureSegments, longestMs: this.#longest, totalMs });
+      this.#tell({ kind: 'full', segments: this.#pictureSegments, longestMs: this.#longest, totalMs });
     });
+  }
+
+  #isWanted(): boolean {
+    return this.#quickWanted || this.#fullWanted || this.#patchWanted || this.#overlayWanted;
+  }
+
+  #tell(report: Omit<FrameReport, 'more'>): void {
+    this.#report({ ...report, more: this.#isWanted() || this.#timer !== null });
   }
 
   /** Waits for the GPU, then goes on with what is wanted. */
@@ -215,7 +223,7 @@ export class FrameLoop {
         return;
       }
       done(elapsed);
-      if (this.#quickWanted || this.#fullWanted || this.#patchWanted || this.#overlayWanted) this.#schedule();
+      if (this.#isWanted()) this.#schedule();
     };
     this.#poll = this.#clock.setTimer(poll, 0);
   }

@@ -10,12 +10,13 @@ import type { ColourMode, ValueRange } from './colours';
 import type { Layer } from './layers';
 import { carryOut, type View, type ViewEvent, type ViewRequest, type WorkerRequest } from './messages';
 import type { Theme } from './palette';
+import type { PictureSizePx } from './picture';
 import type { Shown } from './shown';
 import { Source } from './source';
 import type { BedMesh } from './surface';
 import type { CssPx, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
-import type { PictureSizePx, ViewSizePx } from './view';
+import type { ViewSizePx } from './view';
 
 export interface ToolpathHostOptions {
   readonly size: ViewSizePx;

@@ -19,6 +19,7 @@ export { ToolpathHost, type ToolpathHostOptions } from './host';
 export type { Layer } from './layers';
 export type { Slice, SourcedRequest, ViewEvent, ViewRequest } from './messages';
 export { type HexColour, PALETTES, type Palette, type Theme } from './palette';
+export type { PictureSizePx } from './picture';
 export type { Shown } from './shown';
 export { SLICE_MAX } from './slice';
 export { type BedMesh, exaggerationOf, heightRange } from './surface';
@@ -33,4 +34,4 @@ export {
   type VertexHeader,
   WORDS_PER_VERTEX,
 } from './vertex';
-export type { PictureSizePx, ToolpathView, ViewSizePx } from './view';
+export type { ToolpathView, ViewSizePx } from './view';

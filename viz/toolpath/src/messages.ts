@@ -10,11 +10,12 @@ import type { ColourMode, ColourRanges, ValueRange } from './colours';
 import type { FrameReport } from './frames';
 import type { Layer } from './layers';
 import type { Theme } from './palette';
+import type { PictureSizePx } from './picture';
 import type { Shown } from './shown';
 import type { BedMesh } from './surface';
 import type { CssPx, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
-import type { PictureSizePx, ToolpathView, ViewSizePx } from './view';
+import type { ToolpathView, ViewSizePx } from './view';
 
 /** What carries requests out: the 3D view, or the plane one in its place. */
 export type View = Pick<ToolpathView, Exclude<keyof ToolpathView, 'camera' | 'vertexCount'>>;

@@ -5,11 +5,11 @@
  * leave the part all one colour. Every vertex is looked at once for what it says itself and once for its channels. Does not
  * know: drawing. Units: each mode's own.
  */
-import { CHANNELS, channelUnits, isPlanned } from './channels';
+import { CHANNELS } from './channels';
 import { type Chunk, LEAD_TEXELS } from './chunks';
 import type { ColourMode, ColourRanges, ValueRange } from './colours';
 import type { Layer } from './layers';
-import { FIELDS, FLAGS, featureNumber, field, SIZE_STEP_MM, WORDS_PER_VERTEX } from './vertex';
+import { FIELDS, FLAGS, featureNumber, SIZE_STEP_MM, WORDS_PER_VERTEX } from './vertex';
 
 const NOT_LAID = FLAGS.travel | FLAGS.break;
 const CUSTOM = featureNumber('custom');
@@ -28,11 +28,9 @@ class Span {
   }
 }
 
-/** True for a segment whose values count. */
-function counts(words: Uint32Array, base: number): boolean {
-  const kind = words[base + 2] ?? 0;
-  return (kind & NOT_LAID) === 0 && ((kind >>> FIELDS.feature.shift) & 31) !== CUSTOM;
-}
+/** True for a segment whose values count; `kind` is its vertex's third word. */
+const counts = (kind: number): boolean =>
+  (kind & NOT_LAID) === 0 && ((kind >>> FIELDS.feature.shift) & 31) !== CUSTOM;
 
 export class RangeFinder {
   readonly #height = new Span();
@@ -48,33 +46,48 @@ export class RangeFinder {
   readonly #fan = new Span();
   #layerTime = new Span();
 
+  // Each of these looks at millions: bits are taken by number here (docs/vertex.md), not by the name of a field.
+
   /** New vertices, four words each. */
   addVertices(words: Uint32Array): void {
-    const count = Math.floor(words.length / WORDS_PER_VERTEX);
-    for (let at = 0; at < count; at++) {
-      if (!counts(words, at * WORDS_PER_VERTEX)) continue;
-      const [height, width] = [field(words, at, 'height'), field(words, at, 'width')];
-      // 0: not known.
-      if (height > 0) this.#height.add(height);
-      if (width > 0) this.#width.add(width);
-      this.#tool.add(field(words, at, 'tool'));
-      this.#object.add(field(words, at, 'object'));
+    const end = words.length - (words.length % WORDS_PER_VERTEX);
+    let [sizes, rest] = [0, 0];
+    for (let base = 0; base < end; base += WORDS_PER_VERTEX) {
+      if (!counts(words[base + 2] ?? 0)) continue;
+      const width = ((words[base] ?? 0) >>> 20) & 0x3ff;
+      const height = ((words[base + 1] ?? 0) >>> 20) & 0x1ff;
+      const now = (width << 9) | height;
+      if (now !== sizes) {
+        sizes = now;
+        // 0: not known.
+        if (width > 0) this.#width.add(width);
+        if (height > 0) this.#height.add(height);
+      }
+      // Tool and object seldom change.
+      const whose = (words[base + 3] ?? 0) >>> 20;
+      if (whose === rest && this.#tool.max >= 0) continue;
+      rest = whose;
+      this.#tool.add(whose & 0xf);
+      this.#object.add(whose >>> 4);
     }
   }
 
   /** The channels of vertices `first … first + count − 1` of a chunk, counted from its first. */
   addChannels(vertices: Chunk, channels: Chunk, first: number, count: number): void {
     const words = channels.data;
-    for (let at = LEAD_TEXELS + first; at < LEAD_TEXELS + first + count; at++) {
-      const base = at * WORDS_PER_VERTEX;
-      if (!counts(vertices.data, base) || !isPlanned(words, base)) continue;
-      const [feed, speed] = [channelUnits(words, base, 'feed'), channelUnits(words, base, 'meanSpeed')];
-      const flow = channelUnits(words, base, 'flow');
+    const end = (LEAD_TEXELS + first + count) * WORDS_PER_VERTEX;
+    for (let base = (LEAD_TEXELS + first) * WORDS_PER_VERTEX; base < end; base += WORDS_PER_VERTEX) {
+      // Without a time the planner knows nothing of it.
+      if (words[base + 3] === 0 || !counts(vertices.data[base + 2] ?? 0)) continue;
+      const speed = (words[base] ?? 0) >>> 16;
+      const [dynamics, set] = [words[base + 1] ?? 0, words[base + 2] ?? 0];
+      const feed = dynamics >>> 16;
+      const flow = set & 0xffff;
       this.#feed.add(feed);
       this.#speed.add(speed);
-      this.#accel.add(channelUnits(words, base, 'accel'));
-      this.#nozzle.add(channelUnits(words, base, 'nozzle'));
-      this.#fan.add(channelUnits(words, base, 'fan'));
+      this.#accel.add(dynamics & 0xffff);
+      this.#nozzle.add((set >>> 16) & 0x1ff);
+      this.#fan.add(set >>> 25);
       if (flow === 0 || speed === 0) continue;
       this.#flow.add(flow);
       this.#flowAsked.add((flow * feed) / speed);

@@ -25,7 +25,6 @@ import {
   type BoxMm,
   type CameraState,
   clipPlanes,
-  eyeDistanceMm,
   eyeFrame,
   FIELD_OF_VIEW,
   mmPerPx,
@@ -90,6 +89,14 @@ export class Stage {
 
   get size(): ViewSize {
     return this.#size;
+  }
+
+  get textureSideMax(): number {
+    return this.renderer.capabilities.maxTextureSize;
+  }
+
+  get isLost(): boolean {
+    return this.renderer.getContext().isContextLost();
   }
 
   get ratio(): number {
@@ -187,10 +194,6 @@ export class Stage {
     );
   }
 }
-
-/** What a CSS pixel covers a millimetre away from the eye. */
-export const pixelAngle = (camera: CameraState, size: ViewSize): number =>
-  mmPerPx(camera, size) / eyeDistanceMm(camera);
 
 /** The eye's axes and place. */
 function placeOf(camera: CameraState): Matrix4 {

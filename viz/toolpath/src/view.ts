@@ -16,6 +16,7 @@ import {
   PRESETS,
   type Projection,
   pan,
+  rayThrough,
   type Vec3,
   zoom,
 } from './camera';
@@ -27,6 +28,7 @@ import type { Layer } from './layers';
 import type { ViewEvent } from './messages';
 import { PALETTES, type Palette, type Theme } from './palette';
 import { ALL_PRINTED } from './path_uniforms';
+import { PictureMaker, type PictureSizePx } from './picture';
 import { segmentAt } from './segment';
 import { SHOW_ALL, type Shown, validRange } from './shown';
 import { sliceOf } from './slice';
@@ -39,12 +41,6 @@ export interface ViewSizePx {
   readonly height: CssPx;
   /** Device pixels of a CSS pixel. */
   readonly ratio: number;
-}
-
-/** Of a picture that is kept. */
-export interface PictureSizePx {
-  readonly width: number;
-  readonly height: number;
 }
 
 /** While vertices arrive, the picture follows this often. */
@@ -69,6 +65,7 @@ export class ToolpathView {
     volume: null,
   };
   readonly #drawing: Drawing;
+  readonly #pictures: PictureMaker;
   readonly #loop: FrameLoop;
   #layers: readonly Layer[] = [];
   #bed: Bed | null = null;
@@ -88,6 +85,7 @@ export class ToolpathView {
     this.#canvas = canvas;
     this.#tell = tell;
     this.#drawing = new Drawing(canvas, this.#model, () => this.#loop.patched());
+    this.#pictures = new PictureMaker(this.#drawing, realmClock());
     canvas.addEventListener('webglcontextlost', this.#onLost);
     canvas.addEventListener('webglcontextrestored', this.#onRestored);
     this.#loop = new FrameLoop(this.#drawing, realmClock(), (report) => {
@@ -233,12 +231,18 @@ export class ToolpathView {
   }
 
   /** What is drawn at a point, from the view's left top. */
-  pick(_x: CssPx, _y: CssPx, id: number): void {
-    this.#tell({ type: 'picked', id, vertex: null });
+  pick(x: CssPx, y: CssPx, id: number): void {
+    const { content, camera, shown } = this.#model;
+    const ray = rayThrough(camera, this.#drawing.stage.size, x, y);
+    const vertex = content?.picker.pick(ray, { ranges: this.#drawing.ranges(), shown }) ?? null;
+    this.#tell({ type: 'picked', id, vertex });
   }
 
-  picture(id: number, _size: PictureSizePx): void {
-    this.#tell({ type: 'picture', id, blob: null });
+  /** A PNG of what is seen, in full detail. */
+  picture(id: number, size: PictureSizePx): void {
+    void this.#pictures.make(this.#model.camera, size).then((blob) => {
+      this.#tell({ type: 'picture', id, blob });
+    });
   }
 
   /** Hands out vertices `first … end − 1`, as far as they are there. */
@@ -301,6 +305,7 @@ export class ToolpathView {
 
   readonly #onLost = (): void => {
     this.#loop.pause();
+    this.#pictures.end();
     this.#drawing.lost();
     this.#tell({ type: 'contextLost' });
   };
@@ -352,6 +357,7 @@ export class ToolpathView {
   #empty(): void {
     if (this.#rangesTimer !== null) clearTimeout(this.#rangesTimer);
     this.#rangesTimer = null;
+    this.#pictures.end();
     this.#drawing.empty();
     this.#drawing.highlight.set(null);
     this.#highlight = null;

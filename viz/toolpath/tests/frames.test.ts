@@ -85,6 +85,9 @@ describe('the loop of frames', () => {
     const full = reports.filter(({ kind }) => kind === 'full');
     expect(full).toHaveLength(1);
     expect(full[0]?.segments).toBe(1_000_000);
+    // Only behind the last one nothing follows.
+    expect(reports.map(({ more }) => more).lastIndexOf(true)).toBe(reports.length - 2);
+    expect(reports.filter(({ more }) => !more)).toEqual(full);
     expect(full[0]?.longestMs).toBeLessThan(60);
     expect(clock.idle).toBe(true);
   });

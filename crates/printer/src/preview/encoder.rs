@@ -211,7 +211,8 @@ impl Encoder {
 
     /// Makes sure that the held vertex is where the next segment starts.
     fn start_from(&mut self, from: [f64; 3], line: u32, out: &mut Vec<u32>) {
-        let is_there = self.held.is_some() && !self.broken && distance(self.at_mm, from) < SAME_PLACE_MM;
+        let is_near = self.at_mm == from || distance(self.at_mm, from) < SAME_PLACE_MM;
+        let is_there = self.held.is_some() && !self.broken && is_near;
         if !is_there {
             let layer = self.layers.number();
             let vertex = Vertex {

@@ -119,9 +119,14 @@ pub fn height_units(mm: f64) -> u32 {
     size_units(mm, HEIGHT_MAX)
 }
 
+/// The nearest whole number: one instruction where `round`, which is told what to do below 0, takes a dozen.
+fn rounded(value: f64) -> f64 {
+    (value + 0.5).floor()
+}
+
 fn size_units(mm: f64, max: u32) -> u32 {
     // A float's conversion saturates, and takes what is not a number for 0.
-    libm::round(mm / SIZE_STEP_MM).clamp(0.0, f64::from(max)) as u32
+    rounded(mm / SIZE_STEP_MM).clamp(0.0, f64::from(max)) as u32
 }
 
 impl Vertex {
@@ -192,7 +197,7 @@ impl Grid {
         let mut inside = true;
         let mut steps = [0; 3];
         for axis in 0..3 {
-            let at = libm::round((place_mm[axis] - self.origin_mm[axis]) / self.step_mm);
+            let at = rounded((place_mm[axis] - self.origin_mm[axis]) / self.step_mm);
             inside &= (0.0..=f64::from(STEPS_MAX)).contains(&at);
             steps[axis] = at.clamp(0.0, f64::from(STEPS_MAX)) as u32;
         }
