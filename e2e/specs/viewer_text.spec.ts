@@ -8,6 +8,49 @@ import { Viewer } from '../pages/viewer.ts';
 /** So many lines that their rows are taller than any element of a browser. */
 const LONG_LINES = 2_200_000;
 
+const numberIn = (text: string): number => Number(/Line ([\d,]+)/.exec(text)?.[1]?.replaceAll(',', ''));
+
+test('a click finds the segment, its facts and its line; the text goes there', async ({ panel, page }) => {
+  const viewer = new Viewer(page);
+  const path = sample('test-part.gcode');
+  const lines = readFileSync(path, 'utf8').split('\n');
+  await panel.drop(path);
+  await viewer.ready();
+  await viewer.openText();
+  await viewer.button('Top').click();
+  const without = await viewer.picture();
+  const { x, y } = await viewer.middle();
+  await page.mouse.click(x, y);
+  await expect(viewer.segment).toBeVisible();
+  const line = numberIn(await viewer.segment.innerText());
+  expect(line).toBeGreaterThan(1000);
+  const text = lines[line - 1] ?? '';
+  expect(text).toMatch(/^G[123] /);
+  await expect(viewer.segment).toContainText(text);
+  await expect(viewer.line(line)).toContainText(text);
+  await expect(viewer.line(line)).toHaveAttribute('aria-selected', 'true');
+  await expect(viewer.fact('Actual speed')).toHaveText(/^\d+ \(up to \d+\) mm\/s$/);
+  await expect(viewer.fact('Acceleration')).toHaveText(/^[\d,]+ mm\/s²$/);
+  await expect(viewer.fact('Time')).toHaveText(/^[\d.]+ m?s$/);
+  expect((await viewer.picture()).equals(without), 'the segment is marked').toBe(false);
+  await viewer.button('Put the choice away').click();
+  await expect(viewer.segment).toHaveCount(0);
+  expect((await viewer.picture()).equals(without), 'the segment is marked no more').toBe(true);
+});
+
+test('a pointer that rests on a segment is told what it is on', async ({ panel, page }) => {
+  const viewer = new Viewer(page);
+  await panel.drop(sample('test-part.gcode'));
+  await viewer.ready();
+  await viewer.button('Top').click();
+  await viewer.picture();
+  const { x, y } = await viewer.middle();
+  await page.mouse.move(x, y);
+  await expect(viewer.region.getByRole('tooltip')).toHaveText(/Line [\d,]+/);
+  await page.mouse.move(0, 0);
+  await expect(viewer.region.getByRole('tooltip')).toHaveCount(0);
+});
+
 test('a line that is chosen by key is shown as the last one made', async ({ panel, page }) => {
   const viewer = new Viewer(page);
   const path = sample('test-part.gcode');

@@ -1,11 +1,11 @@
 // The preview worker: reads a file through the planner's preview and hands out geometry, findings and estimates. Also
 // checks printer.cfg texts. One file at a time: a new one ends the reading of the one before.
-import type { SourcedRequest, ViewRequest } from '@stepcast/toolpath';
+import type { Layer, SourcedRequest, ViewRequest } from '@stepcast/toolpath';
 import { FileChunks, linesOf, type Packing, packingOf } from '../files';
 import { fileUnreadable, plannerMissing } from '../machine/troubles';
 import { LineIndex } from './line_index';
 import { type FilePreview, loadReader, type Reader } from './planner';
-import type { FromPreview, ToPreview } from './protocol';
+import type { FromPreview, Summary, ToPreview } from './protocol';
 
 /** Progress is told this often at most, in ms. */
 const PROGRESS_MS = 50;
@@ -76,6 +76,15 @@ function feed(preview: FilePreview, job: number, chunk: Uint8Array): void {
   }
 }
 
+/** By the way of the vertices, so that they come after these, whatever the view is busy with. */
+function layersOf({ layers, time }: Summary): Layer[] {
+  return layers.map(({ first, z, time: timeS }) => ({
+    firstVertex: first,
+    zMm: z,
+    ...(time === null ? {} : { timeS }),
+  }));
+}
+
 async function read(
   reader: Reader,
   { job, file, name, config }: ToPreview & { kind: 'open' },
@@ -105,9 +114,11 @@ async function read(
     }
     preview.finish();
     pass(preview, job);
+    const summary = preview.summary();
+    draw(job, { type: 'setLayers', layers: layersOf(summary) });
     draw(job, { type: 'end' });
-    tell({ kind: 'summary', job, summary: preview.summary() });
     draw(job, { type: 'fit' });
+    tell({ kind: 'summary', job, summary });
   } finally {
     preview.free();
     await chunks.cancel();

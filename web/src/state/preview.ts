@@ -19,7 +19,6 @@ export interface GeometrySink {
   source(port: MessagePort): void;
   /** What comes of jobs before this one is not wanted any more. */
   discard(before: number): void;
-  finish(summary: Summary): void;
 }
 
 export const file = signal<OpenFile | null>(null);
@@ -252,7 +251,6 @@ function take(message: FromPreview): void {
       reading.value = null;
       linesRead.value = message.summary.lines;
       summary.value = message.summary;
-      sink?.finish(message.summary);
       break;
     case 'failed':
       reading.value = null;

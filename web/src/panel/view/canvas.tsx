@@ -165,14 +165,6 @@ function follow(host: ToolpathHost): () => void {
       hovered.value = null;
       host.discard(before);
     },
-    finish: ({ layers, time }) =>
-      host.setLayers(
-        layers.map(({ first, z, time: timeS }) => ({
-          firstVertex: first,
-          zMm: z,
-          ...(time === null ? {} : { timeS }),
-        })),
-      ),
   });
   followText();
   const ends = [

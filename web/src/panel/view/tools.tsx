@@ -19,10 +19,14 @@ const PRESETS: readonly { readonly preset: CameraPreset; readonly name: string; 
 
 /** Of a picture that is kept; the shape is the view's. */
 const PICTURE_WIDTH_PX = 1920;
+const TRIES_MAX = 3;
 
 async function savePicture(shape: number): Promise<void> {
   const height = Math.round(PICTURE_WIDTH_PX / Math.min(Math.max(shape, 0.25), 4));
-  const blob = await pictureOf(PICTURE_WIDTH_PX, height);
+  let blob: Blob | null = null;
+  // One that is begun before the view has all of a new file comes to nothing.
+  for (let tries = 0; !blob && tries < TRIES_MAX; tries += 1)
+    blob = await pictureOf(PICTURE_WIDTH_PX, height);
   const name = (file.peek()?.name ?? 'toolpath').replace(/\.(gcode|gco|g|gz|nc|txt)$/i, '');
   if (blob) save(blob, `${name}.png`);
 }

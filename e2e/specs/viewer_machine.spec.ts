@@ -1,0 +1,71 @@
+// Where one looks from, how, and a picture to keep; the machine around the part.
+import { expect, test } from '../fixtures/files.ts';
+import { sample } from '../pages/panel.ts';
+import { Viewer } from '../pages/viewer.ts';
+
+const PNG_BEGINNING = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
+
+test('the view is turned by buttons and keys, with and without perspective', async ({ panel, page }) => {
+  test.setTimeout(120_000);
+  const viewer = new Viewer(page);
+  await panel.drop(sample('test-part.gcode'));
+  await viewer.ready();
+  const seen: Buffer[] = [];
+  const expectNew = async (what: string): Promise<void> => {
+    const now = await viewer.picture();
+    for (const other of seen) expect(now.equals(other), what).toBe(false);
+    seen.push(now);
+  };
+  await expectNew('as it was');
+  for (const name of ['Top', 'Front', 'Left', 'Right', 'Back']) {
+    await viewer.button(name).click();
+    await expectNew(name);
+  }
+  await viewer.button('All').click();
+  await expectNew('All');
+  await viewer.button('Without perspective').click();
+  await expect(viewer.button('Without perspective')).toHaveAttribute('aria-pressed', 'true');
+  await expectNew('without perspective');
+  await viewer.view.focus();
+  for (const key of ['ArrowLeft', 'ArrowUp', 'Shift+ArrowLeft', '+']) {
+    await page.keyboard.press(key);
+    await expectNew(key);
+  }
+});
+
+test('a picture of the view is kept as PNG', async ({ panel, page }) => {
+  const viewer = new Viewer(page);
+  await panel.drop(sample('test-part.gcode'));
+  await viewer.ready();
+  await viewer.picture();
+  // In full detail and large: without a graphics card that takes its time.
+  test.setTimeout(150_000);
+  const coming = page.waitForEvent('download', { timeout: 90_000 });
+  await viewer.button('Save a picture').click();
+  const download = await coming;
+  expect(download.suggestedFilename()).toBe('test-part.png');
+  const pieces: Buffer[] = [];
+  for await (const piece of await download.createReadStream()) pieces.push(piece as Buffer);
+  const bytes = Buffer.concat(pieces);
+  expect(bytes.subarray(0, 8).equals(PNG_BEGINNING)).toBe(true);
+  expect(bytes.readUInt32BE(16)).toBe(1920);
+  expect(bytes.length).toBeGreaterThan(20_000);
+});
+
+test('what leaves the machine is told by its colour', async ({ panel, page, makeFile }) => {
+  const viewer = new Viewer(page);
+  const bead = (x: number): string =>
+    `G28\nG90\nM82\nM104 S200\nM109 S200\nG92 E0\nG1 Z0.2 F600\nG1 X${x} Y100 F6000\nG1 X${x + 40} Y100 E4 F1200\n`;
+  /** Seen from the top and fitted, the same bead looks the same wherever it lies, but for the bed. */
+  const look = async (x: number): Promise<Buffer> => {
+    await panel.look(makeFile(`bead-${x}.gcode`, bead(x)));
+    await viewer.ready();
+    await viewer.button('Top').click();
+    const { x: left, y: top } = await viewer.middle();
+    await viewer.picture();
+    return await page.screenshot({ clip: { x: left - 4, y: top - 2, width: 8, height: 4 } });
+  };
+  const within = await look(90);
+  expect((await look(100)).equals(within)).toBe(true);
+  expect((await look(900)).equals(within)).toBe(false);
+});
