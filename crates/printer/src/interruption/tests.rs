@@ -98,11 +98,12 @@ fn line_and_layer_are_told() {
 /// Of a line over a mesh only the first of many pieces is known to have been made.
 #[test]
 fn a_move_in_pieces_may_have_been_made_in_part() {
-    const BED: &str = "\n[bed_mesh]\n[bed_mesh cold]\npoints:\n  0.2, 0.0\n  -0.1, 0.3\nx_count: 2\ny_count: 2\n\
-        min_x: 0\nmax_x: 200\nmin_y: 0\nmax_y: 200\n";
+    const BED: &str = "\n[bed_mesh]\n[bed_mesh cold]\npoints:\n  0.2, 0.1, 0.0\n  0.1, 0.0, 0.1\n  -0.1, 0.0, 0.3\n\
+        x_count: 3\ny_count: 3\nmin_x: 0\nmax_x: 100\nmin_y: 0\nmax_y: 100\n";
     const LONG: &str =
         "G28\nM83\nG1 Z1 F600\nG1 X10 Y10 F6000\nG1 X190 E9 F1200\nG1 X10 E9\nG1 E-1\nG1 Y90 E4 F60\n";
-    let config = crate::config::parse(&format!("{MACHINE}{BED}")).0.unwrap();
+    let config = crate::config::parse(&format!("{MACHINE}{BED}"));
+    let config = config.0.unwrap_or_else(|| panic!("{:?}", config.1));
     let mesh = || crate::transform::TransformRecord { mesh: Some("cold".into()), ..Default::default() };
     let found = |transform, start_line, records: &[Record]| {
         surveyed_of(&config, LONG, journal_of(&config, transform, start_line, records)).unwrap()
