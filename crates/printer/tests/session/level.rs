@@ -1,9 +1,11 @@
 //! Prints on a bed that is not flat, by axes that are not square: hosts that die, pauses, and prints that begin with a line.
 
 use printer::{
+    error::ErrorCode,
     journal::Journal,
     session::{Event, JobOptions, JobStatus, PhaseName, Request, ScheduledMove},
 };
+use units::Mm;
 use virtual_printer::BoardProfile;
 
 use crate::{
@@ -196,4 +198,31 @@ fn a_print_that_begins_with_a_line_goes_above_the_bed_that_it_has() {
             assert!(way.from[2].min(way.to[2]) >= top + 1.9, "{line}: {way:?} {top}");
         }
     }
+}
+
+#[test]
+fn what_is_said_of_an_axis_is_what_is_told_of_it() {
+    let mut bench = levelled(BoardProfile::rp2040()).ready();
+    bench.gcode("BED_MESH_PROFILE LOAD=cold\nG28\nG1 X70 Y80 Z10 F6000");
+    let set = |axis, mm| Request::SetPosition { axis, position: Mm(mm) };
+    let told = |bench: &Bench, axis: usize| bench.session.position().unwrap().0[axis];
+    // Above, in and below the fade; saying it again changes nothing.
+    for z in [10.0, 3.0, 0.3] {
+        for _ in 0..3 {
+            bench.ask(set(2, z));
+            assert!((told(&bench, 2) - z).abs() < 1e-9, "{z} {}", told(&bench, 2));
+        }
+    }
+    // At the bed's middle, which is deep, the motor stands lower than the head over the bed.
+    assert!((-0.2..-0.05).contains(&bench.session.z_lift()), "{}", bench.session.z_lift());
+    // Where the motor would be below its end.
+    assert_eq!(bench.request(set(2, 0.0)).unwrap_err().code, ErrorCode::MoveOutOfRange);
+    bench.gcode("SKEW_PROFILE LOAD=lean");
+    for (axis, mm) in [(1, 60.0), (0, 40.0), (2, 5.0)] {
+        bench.ask(set(axis, mm));
+        assert!((told(&bench, axis) - mm).abs() < 1e-9, "{axis} {mm} {}", told(&bench, axis));
+    }
+    // Of axes that lean none is known without the others.
+    bench.gcode("M84");
+    assert_eq!(bench.request(set(0, 40.0)).unwrap_err().code, ErrorCode::NotHomed);
 }
