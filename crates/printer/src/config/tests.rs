@@ -468,16 +468,34 @@ fn a_mesh_that_is_wrong_is_told_what() {
         assert_eq!(config, None, "{new}");
         assert!(diagnostics.iter().any(|it| it.message.contains(told)), "{told}: {diagnostics:#?}");
     }
-    let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}\n[bed_mesh]\nfade_end: 1.1\n{SAVED_MESH}"));
-    assert_eq!(config, None);
-    assert!(
-        diagnostics.iter().any(|it| it.message.contains("fade_end less fade_start is 0.100 mm")),
-        "{diagnostics:#?}"
-    );
     for option in
         ["mesh_min: 5", "probe_count: 2", "mesh_pps: 1,2,3", "algorithm: x", "zero_reference_position: a, b"]
     {
         let (config, _) = parse(&format!("{SMALL_MACHINE}\n[bed_mesh]\n{option}\n"));
         assert_eq!(config, None, "{option}");
     }
+}
+
+#[test]
+fn a_mesh_that_cannot_be_used_is_left_out_and_told() {
+    for (options, told) in [
+        ("fade_end: 1.1", "fade_end less fade_start is 0.100 mm"),
+        ("fade_end: 10\nfade_target: 5", "fade_target 5.000 mm is not between"),
+    ] {
+        let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}\n[bed_mesh]\n{options}\n{SAVED_MESH}"));
+        let profiles = config.unwrap_or_else(|| panic!("{diagnostics:#?}")).profiles;
+        assert!(profiles.meshes.is_empty() && profiles.skews.contains_key("calm"), "{profiles:?}");
+        let warned = |it: &ConfigDiagnostic| it.severity == Severity::Warning && it.message.contains(told);
+        assert!(diagnostics.iter().any(warned), "{told}: {diagnostics:#?}");
+    }
+}
+
+#[test]
+fn meshes_are_read_as_klipper_reads_them() {
+    let options = "\n[bed_mesh]\nalgorithm: Bicubic\nsplit_delta_z: 2.0\n";
+    let mesh = SAVED_MESH.replace("algo = ", "algo = L").replace("Llagrange", "LAGRANGE");
+    let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}{options}{mesh}"));
+    let profiles = config.unwrap_or_else(|| panic!("{diagnostics:#?}")).profiles;
+    // Never less exact than here is usual.
+    assert_eq!(profiles.meshes["default"].z_error, crate::transform::Z_ERROR_MAX_MM);
 }
