@@ -429,13 +429,14 @@ const SAVED_MESH: &str = "
 #[test]
 fn meshes_and_skews_are_read_as_they_were_saved() {
     let options = "\n[skew_correction]\n[bed_mesh]\nspeed: 120\nmesh_min: 35, 6\nmesh_max: 240, 198\n\
-        probe_count: 5, 3\nalgorithm: bicubic\nfaulty_region_1_min: 1, 2\nfade_end: 10\nfade_target: 0\n\
+        probe_count: 5, 3\nalgorithm: Bicubic\nsplit_delta_z: 2.0\nfaulty_region_1_min: 1, 2\nfade_end: 10\nfade_target: 0\n\
         zero_reference_position: 20, 10\n";
     let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}{options}{SAVED_MESH}"));
     assert!(diagnostics.iter().all(|it| it.severity == Severity::Info), "{diagnostics:#?}");
     let profiles = config.unwrap().profiles;
     assert_eq!(profiles.skews["calm"], crate::transform::Skew { xy: 0.004, xz: 0.0, yz: 0.0 });
     let mesh = &profiles.meshes["default"];
+    assert_eq!(mesh.z_error, crate::transform::Z_ERROR_MAX_MM);
     let at = |x, y| mesh.machine_from_gcode([x, y, 0.0])[2];
     // Less what it is where Z is to be 0.
     for (place, height) in
@@ -488,14 +489,4 @@ fn a_mesh_that_cannot_be_used_is_left_out_and_told() {
         let warned = |it: &ConfigDiagnostic| it.severity == Severity::Warning && it.message.contains(told);
         assert!(diagnostics.iter().any(warned), "{told}: {diagnostics:#?}");
     }
-}
-
-#[test]
-fn meshes_are_read_as_klipper_reads_them() {
-    let options = "\n[bed_mesh]\nalgorithm: Bicubic\nsplit_delta_z: 2.0\n";
-    let mesh = SAVED_MESH.replace("algo = ", "algo = L").replace("Llagrange", "LAGRANGE");
-    let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}{options}{mesh}"));
-    let profiles = config.unwrap_or_else(|| panic!("{diagnostics:#?}")).profiles;
-    // Never less exact than here is usual.
-    assert_eq!(profiles.meshes["default"].z_error, crate::transform::Z_ERROR_MAX_MM);
 }
