@@ -244,7 +244,7 @@ fn a_factor_that_is_lowered_in_the_middle_of_a_line_holds_from_the_next() {
         assert_eq!(made(&mut planner, &mut source, "").1, None, "{load}{way}");
         assert!((planner.position()[3] - filament).abs() < 1e-9, "{way}");
         // The next line is as the file has it: too fast is refused.
-        let error = made(&mut planner, &mut source, "G1 X100 E75 F12000\n").1.map(|error| error.code);
+        let error = made(&mut planner, &mut source, "G1 X50 E75 F12000\n").1.map(|error| error.code);
         assert_eq!(error, Some(ErrorCode::StepRateTooHigh), "{load}{way}");
     }
 }
