@@ -297,15 +297,16 @@ impl Checker {
 
     fn home(&mut self, axes: [bool; 3]) {
         let axes = self.config.as_ref().map_or(axes, |config| machine::homed_together(config, axes));
-        let mut at = [None; 3];
+        let endstops = self
+            .config
+            .as_ref()
+            .map_or([0.0; 3], |config| config.steppers.each_ref().map(|stepper| stepper.position_endstop.0));
         for axis in (0..3).filter(|&axis| axes[axis]) {
-            at[axis] =
-                Some(self.config.as_ref().map_or(0.0, |config| config.steppers[axis].position_endstop.0));
             if let Some(guard) = &mut self.guard {
                 guard.set_homed(axis, true);
             }
         }
-        self.interpreter.set_axes(at[0], at[1], at[2]);
+        self.transform.home(&mut self.interpreter, axes, endstops);
     }
 
     /// The machine file's heater; one that it does not have is an error.

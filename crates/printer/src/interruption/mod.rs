@@ -238,8 +238,7 @@ impl Survey {
             }
             Action::Home { x, y, z } => {
                 let axes = machine::homed_together(&self.config, [*x, *y, *z]);
-                let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.endstops[axis]));
-                self.source.interpreter.set_axes(x, y, z);
+                self.transform.home(&mut self.source.interpreter, axes, self.endstops);
                 None
             }
             Action::Skew(_) | Action::BedMesh(_) => {

@@ -14,7 +14,7 @@ mod tests;
 use core::fmt::Write as _;
 use std::{collections::BTreeMap, sync::Arc};
 
-use gcode::{Action, MeshChange, SkewChange};
+use gcode::{Action, Interpreter, MeshChange, SkewChange};
 use serde::{Deserialize, Serialize};
 
 pub use mesh::{Fade, Mesh, MeshError, Z_ERROR_MAX_MM};
@@ -177,6 +177,28 @@ impl Transform {
             motors[axis] += wanted - self.gcode_from_machine(motors)[axis];
         }
         motors[axis]
+    }
+
+    /// Tells who reads G-code that these axes have been homed, and that the motors stand there: X and Y are where the
+    /// skew has them for it, all those that lean with what was homed. Z counts as the endstop says, with a mesh too: the
+    /// next move makes up for it.
+    pub fn set_homed(&self, interpreter: &mut Interpreter, axes: [bool; 3], motors: [f64; 3]) {
+        let [x, y, z] = motors;
+        let z = if axes[2] { z } else { interpreter.position().z };
+        let at = self.skew.gcode_from_machine([x, y, z]);
+        if self.skew != Skew::default() {
+            interpreter.stand_at(at[0], at[1], at[2]);
+        }
+        let [x, y, z] = core::array::from_fn(|axis| axes[axis].then_some(at[axis]));
+        interpreter.set_axes(x, y, z);
+    }
+
+    /// The same where of the other axes nothing is known but what has been read.
+    pub fn home(&self, interpreter: &mut Interpreter, axes: [bool; 3], endstops: [f64; 3]) {
+        let gcode::Position { x, y, z, .. } = interpreter.position();
+        let before = self.machine_from_gcode([x, y, z]);
+        let motors = core::array::from_fn(|axis| if axes[axis] { endstops[axis] } else { before[axis] });
+        self.set_homed(interpreter, axes, motors);
     }
 
     /// The least and the most that is ever added to Z.

@@ -226,3 +226,37 @@ fn what_is_said_of_an_axis_is_what_is_told_of_it() {
     bench.gcode("M84");
     assert_eq!(bench.request(set(0, 40.0)).unwrap_err().code, ErrorCode::NotHomed);
 }
+
+#[test]
+fn an_axis_that_is_homed_in_a_print_leaves_the_others_where_the_skew_has_them() {
+    let setup = levelled(BoardProfile::rp2040());
+    let file = leaning(&file()).replacen("M400\n", "G28 Y\nG1 Z2 F600\nM400\n", 1);
+    let homing = 1 + file.lines().position(|line| line == "G28 Y").unwrap() as u32;
+    let begun = || {
+        let (mut bench, _) = started(&setup, &file);
+        let homed = |event: &&Event| matches!(event, Event::Homed { axis: 1, .. });
+        bench.until("homed again", 100.0, |bench| bench.events.iter().filter(homed).count() > 1);
+        let from = bench.pulses().len();
+        (bench, from)
+    };
+    let (mut whole, from) = begun();
+    whole.job_over();
+    whole.job_done();
+    let expected = steps(&mut whole, from);
+    // What goes up takes X and Y along by what it leans, and by no more.
+    let made = moves(&whole);
+    let up: Vec<_> = made.iter().filter(|mv| mv.line == homing + 1).collect();
+    assert!(!up.is_empty());
+    let by = |mv: &ScheduledMove, axis: usize| (mv.to[axis] - mv.from[axis]).abs();
+    assert!(up.iter().all(|mv| by(mv, 0) < 0.02 && by(mv, 1) < 0.005), "{up:?}");
+    for late in [0.3, 1.5] {
+        let (mut bench, from) = begun();
+        bench.run(late);
+        die(&mut bench, &setup, 0.2);
+        take_up(&mut bench, &file);
+        bench.ask(Request::Resume);
+        bench.job_over();
+        bench.job_done();
+        assert!(steps(&mut bench, from) == expected, "{late}");
+    }
+}

@@ -261,12 +261,10 @@ impl Ready {
                 return;
             }
         }
-        let position = self.planner.position();
-        let [x, y, z] = core::array::from_fn(|axis| axes[axis].then_some(position[axis]));
         // A job that is paused, or on its way to its first line, has nothing to do with it.
         let plans_job = self.plans_job();
         let source = self.job.as_mut().filter(|_| plans_job).map(|job| &mut job.source);
-        source.unwrap_or(&mut self.console.source).interpreter.set_axes(x, y, z);
+        self.planner.tell_homed(axes, source.unwrap_or(&mut self.console.source));
     }
 
     /// Has axes homed, one after the other, or all together.
