@@ -264,6 +264,7 @@ impl Host {
             temperatures: self.temperatures.clone(),
             position_mm: position.map(|(position, _)| position),
             live_mm: self.live(now),
+            z_lift_mm: self.session.z_lift(),
             homed: position.map_or([false; 3], |(_, homed)| homed),
             job: JobView {
                 status: self.session.job_status().into(),

@@ -3,7 +3,7 @@
 import type { VirtualState } from '../src/bindings/VirtualState';
 import type { JobStatus, MachineEvent, Phase, PrintStart, Trouble, Wish } from '../src/machine/protocol';
 import type { Session, SessionSnapshot, SimulatedPrinter } from '../src/machine/session';
-import { celsius, type Seconds, seconds, share } from '../src/units';
+import { celsius, mm, type Seconds, seconds, share } from '../src/units';
 
 const SNAPSHOT: SessionSnapshot = {
   phase: 'ready',
@@ -11,6 +11,7 @@ const SNAPSHOT: SessionSnapshot = {
     { name: 'extruder', temperature: celsius(20), target: celsius(0), duty: share(0), isStandby: false },
   ],
   position: null,
+  zLift: mm(0),
   homed: [false, false, false],
   job: 'none',
   start: null,

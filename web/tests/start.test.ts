@@ -157,6 +157,14 @@ test('a measured Z is near one of the places where the motor can stand, wherever
   expect(near(0.5, 0.5)).toBeCloseTo(0.56, 9);
 });
 
+test('places of the motor are told as heights over the bed', () => {
+  const here = start.overBed(AT, -0.1);
+  expect(here?.zPlaces[0]).toBeCloseTo(0.5, 9);
+  expect(here?.zRange?.[1]).toBeCloseTo(0.5, 9);
+  expect(here?.zPitch).toBe(AT.zPitch);
+  expect(start.overBed(null, 1)).toBeNull();
+});
+
 test('where nothing is known of such places none is named', () => {
   const blind = { ...AT, zPlaces: [] };
   expect(start.placeNear(null, 1)).toBeNull();

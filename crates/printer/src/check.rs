@@ -250,7 +250,9 @@ impl Checker {
             }
             Action::MotorsOff { x, y, z, .. } => {
                 if let Some(guard) = &mut self.guard {
-                    let off = [x, y, z];
+                    let off = [x, y, z, false];
+                    let off =
+                        self.config.as_ref().map_or(off, |config| machine::geometry(config).coupled(off));
                     (0..3).filter(|&axis| off[axis]).for_each(|axis| guard.set_homed(axis, false));
                 }
             }
@@ -276,7 +278,7 @@ impl Checker {
                 }
             }
         }
-        let allowed = self.guard.as_ref().map_or(Ok(()), |guard| judge(guard, &self.transform, mv));
+        let allowed = self.guard.as_ref().map_or(Ok(()), |guard| judge(guard, &self.transform, mv, bend));
         let possible = self.speeds.as_ref().map_or(Ok(()), |speeds| speeds.judge(mv, bend));
         if let Err(error) = allowed.and(possible) {
             self.keep(error);
@@ -302,15 +304,16 @@ impl Checker {
 
     fn home(&mut self, axes: [bool; 3]) {
         let axes = self.config.as_ref().map_or(axes, |config| machine::homed_together(config, axes));
-        let mut at = [None; 3];
+        let endstops = self
+            .config
+            .as_ref()
+            .map_or([0.0; 3], |config| config.steppers.each_ref().map(|stepper| stepper.position_endstop.0));
         for axis in (0..3).filter(|&axis| axes[axis]) {
-            at[axis] =
-                Some(self.config.as_ref().map_or(0.0, |config| config.steppers[axis].position_endstop.0));
             if let Some(guard) = &mut self.guard {
                 guard.set_homed(axis, true);
             }
         }
-        self.interpreter.set_axes(at[0], at[1], at[2]);
+        self.transform.home(&mut self.interpreter, axes, endstops);
     }
 
     /// The machine file's heater; one that it does not have is an error.
@@ -356,11 +359,12 @@ impl Checker {
 }
 
 /// Why a move may not be made, if so: where the machine goes for it, and what it extrudes.
-fn judge(guard: &Guard, transform: &Transform, mv: &Move) -> Result<(), PrinterError> {
-    if transform.is_identity() {
-        return guard.judge(mv);
-    }
+fn judge(guard: &Guard, transform: &Transform, mv: &Move, bend: Option<&Bend>) -> Result<(), PrinterError> {
     let (from, to) = (mv.from.to_array(), mv.to.to_array());
+    if transform.is_identity() {
+        guard.judge(mv)?;
+        return bend.map_or(Ok(()), |bend| guard.judge_bend(bend, from, to, mv.line));
+    }
     if from[..3] != to[..3] {
         let [x, y, z, _] = from;
         let mut at = transform.machine_from_gcode([x, y, z]);
@@ -385,6 +389,12 @@ mod tests {
         // In pieces, as files come.
         text.as_bytes().chunks(7).for_each(|piece| checker.feed(piece));
         checker.finish()
+    }
+
+    fn found(machine: &str, text: &str) -> Vec<(ErrorCode, Option<u32>)> {
+        let mut checker = Checker::new(Some(&crate::config::parse(machine).0.expect("a machine")));
+        checker.feed(text.as_bytes());
+        checker.finish().errors.iter().map(|error| (error.code, error.line)).collect()
     }
 
     fn errors(text: &str) -> Vec<(ErrorCode, Option<u32>)> {
@@ -425,17 +435,29 @@ mod tests {
     }
 
     #[test]
+    fn motors_that_hang_together_are_off_together() {
+        for (machine, off) in [
+            (include_str!("../../../samples/corexy.cfg"), "G28\nG1 Z5\nM84 X\nG1 Y5\n"),
+            (include_str!("../../../samples/delta.cfg"), "G28\nG1 Z5\nM84 X\nG1 Z6\n"),
+        ] {
+            assert_eq!(found(machine, off), [(ErrorCode::NotHomed, Some(4))], "{off}");
+        }
+    }
+
+    #[test]
+    fn an_arc_that_bulges_out_of_a_round_bed_is_found() {
+        // The ends of its only chord are within the bed's 110 mm, its middle is not.
+        let arc = "G28\nG1 Z5\nG1 X78.13417 Y77.42706\nG3 X77.42706 Y78.13417 I-42.77996 J-42.07285\n";
+        let delta = include_str!("../../../samples/delta.cfg");
+        assert_eq!(found(delta, arc), [(ErrorCode::MoveOutOfRange, Some(4))]);
+    }
+
+    #[test]
     fn what_no_driver_can_step_is_found_at_its_line() {
         // 2560 steps/mm in X: with pulses of 2 µs 97 mm/s is the most.
         let usual = include_str!("../../../samples/printer.cfg");
         let text = usual.replacen("rotation_distance: 40", "rotation_distance: 1.25", 1);
-        let config = crate::config::parse(&text).0.expect("a machine");
-        let found = |text: &str| {
-            let mut checker = Checker::new(Some(&config));
-            checker.feed(text.as_bytes());
-            let errors = checker.finish().errors;
-            errors.iter().map(|error| (error.code, error.line)).collect::<Vec<_>>()
-        };
+        let found = |file: &str| found(&text, file);
         let too_fast = |line| vec![(ErrorCode::StepRateTooHigh, Some(line))];
         assert_eq!(found("G28\nG1 X50 F5800\nG1 X5 Y100 F6500\n"), []);
         assert_eq!(found("G28\nG1 X50 F5800\nG1 X5 F6000\n"), too_fast(3));

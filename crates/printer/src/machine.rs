@@ -71,8 +71,13 @@ impl Motors {
         Self { geometry: geometry(config), steps_mm: step_distances(config).map(|distance| distance.0) }
     }
 
+    /// How they move the head.
+    pub(crate) const fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
     /// The step that each motor is on where the machine stands there.
-    fn counts(&self, position: &[f64; MOTORS]) -> [f64; MOTORS] {
+    pub(crate) fn counts(&self, position: &[f64; MOTORS]) -> [f64; MOTORS] {
         let at = self.geometry.motor_positions(position);
         core::array::from_fn(|motor| libm::floor(at[motor] * (1.0 / self.steps_mm[motor]) + 0.5))
     }

@@ -24,6 +24,8 @@ pub struct Snapshot {
     pub position_mm: Option<[f64; 4]>,
     /// Where the head is now, on the way there. `null` while it is not known.
     pub live_mm: Option<[f64; 4]>,
+    /// How much higher Z's motor stands than `position_mm` has it: what makes up for a bed that is not flat.
+    pub z_lift_mm: f64,
     /// Which of X, Y, Z are homed; the position of the others means nothing.
     pub homed: [bool; 3],
     /// The print.

@@ -36,6 +36,10 @@ position_mm: [Mm, Mm, Mm, Mm] | null,
  */
 live_mm: [Mm, Mm, Mm, Mm] | null, 
 /**
+ * How much higher Z's motor stands than `position_mm` has it: what makes up for a bed that is not flat.
+ */
+z_lift_mm: Mm, 
+/**
  * Which of X, Y, Z are homed; the position of the others means nothing.
  */
 homed: [boolean, boolean, boolean], 

@@ -176,6 +176,7 @@ function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
       isStandby: heater.standby,
     })),
     position: position && place(position),
+    zLift: mm(now.z_lift_mm),
     homed: now.homed,
     job: now.job.status,
     start: now.job.start && {

@@ -76,6 +76,8 @@ export interface Snapshot {
   readonly heaters: readonly HeaterState[];
   /** X, Y, Z, E where the head is now, as far as that is known. */
   readonly position: readonly [Mm, Mm, Mm, Mm] | null;
+  /** How much higher Z's motor stands than `position` has it, at rest: what makes up for a bed that is not flat. */
+  readonly zLift: Mm;
   readonly homed: readonly [boolean, boolean, boolean];
   readonly job: JobStatus;
   /** The print is paused before its first line, which is in the middle of its file. */

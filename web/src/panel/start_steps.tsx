@@ -9,6 +9,7 @@ import {
   isToBegin,
   nearestPlace,
   noteZ,
+  overBed,
   placeNear,
   type Starting,
   starting,
@@ -125,17 +126,22 @@ function type(z: number): void {
 function SayZ({ begun }: { readonly begun: Starting }): JSX.Element {
   const axis = axisZ();
   const known = knownZ();
-  const { place, at } = begun;
+  // The motor's places, which stay where they are, are told as heights over the bed, as everything that is typed.
+  const lift = snapshot.value?.zLift ?? 0;
+  const motor = (z: number | null): number | null => (z === null ? null : z + lift);
+  const { place } = begun;
+  const at = overBed(begun.at, lift);
   const [min, max] = [axis?.min ?? 0, axis?.max ?? 0];
   const proposed = known ?? at?.zPlaces[0] ?? at?.zRange?.[0] ?? place.top;
   const typed = typedZ.value?.of === begun ? typedZ.value.z : null;
   const value = Math.min(Math.max(typed ?? proposed, min), max);
-  const base = placeNear(at, known);
+  const near = placeNear(begun.at, motor(known));
+  const base = near === null ? null : near - lift;
   // What the motor says is proposed, and claimed by nobody but the user.
   const isSaid = known !== null || typed !== null;
   const say = async (): Promise<void> => {
     if (!(await wish({ kind: 'set-position', axis: 'Z', position: mm(value) }))) return;
-    noteZ(begun, known, value);
+    noteZ(begun, motor(known), value + lift);
     typedZ.value = null;
   };
   return (

@@ -95,6 +95,14 @@ export function noteZ({ at }: Starting, known: number | null, said: number): voi
   placeOffset.value = place === null ? null : place - said;
 }
 
+/** The same with heights over the bed where the head is: journal and motor know nothing of the bed that is made up for. */
+export const overBed = (at: Interruption | null, lift: number): Interruption | null =>
+  at && {
+    ...at,
+    zRange: at.zRange && [mm(at.zRange[0] - lift), mm(at.zRange[1] - lift)],
+    zPlaces: at.zPlaces.map((place) => mm(place - lift)),
+  };
+
 /** The user says that the part is where it was. */
 export const isPartThere = signal(false);
 

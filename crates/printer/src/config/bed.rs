@@ -44,7 +44,7 @@ pub(super) fn profiles(builder: &mut Builder<'_>) -> Checked<Arc<Profiles>> {
         let Some(mut reader) = builder.section(&section) else { continue };
         let found = profile(&mut reader, settings.as_ref().ok());
         reader.finish();
-        // A mesh that is not loaded does no harm, and one that is has been refused here.
+        // What cannot be read has been refused; what cannot be used is not there when it is to be loaded.
         if let Ok(mesh) = found {
             meshes.insert(mesh.name.clone(), Arc::new(mesh));
         }
@@ -134,7 +134,7 @@ fn bed_mesh(builder: &mut Builder<'_>) -> Checked<Settings> {
     let start = reader.number_or("fade_start", 1.0, Range::from(-PLACE_MAX_MM).to(PLACE_MAX_MM));
     let end = reader.number_or("fade_end", 0.0, Range::from(-PLACE_MAX_MM).to(PLACE_MAX_MM));
     let target = reader.optional_number("fade_target", Range::from(-HEIGHT_MAX_MM).to(HEIGHT_MAX_MM));
-    let z_error = reader.number_or("split_delta_z", 0.025, Range::from(Z_ERROR_MIN_MM).to(1.0));
+    let z_error = reader.number_or("split_delta_z", 0.025, Range::from(Z_ERROR_MIN_MM));
     let reference = place(&mut reader, "zero_reference_position");
     reader.finish();
     Ok(Settings {
@@ -202,7 +202,10 @@ fn profile(reader: &mut Reader<'_>, settings: Option<&Settings>) -> Checked<Mesh
         }
         _ => surface,
     };
-    Mesh::new(name, surface, Some(*fade), *target, *z_error).map_err(|error| reader.error("points", error))
+    Mesh::new(name, surface, Some(*fade), *target, *z_error).map_err(|error| {
+        reader.warning("points", format!("the profile is left out and cannot be loaded: {error}"));
+        Reported
+    })
 }
 
 fn is_on(surface: &Surface, place: [f64; 2]) -> bool {
@@ -247,11 +250,12 @@ enum Algorithm {
 }
 
 fn algorithm(reader: &mut Reader<'_>, key: &'static str) -> Checked<Algorithm> {
-    match reader.text(key).as_deref() {
-        None | Some("lagrange") => Ok(Algorithm::Lagrange),
-        Some("bicubic") => Ok(Algorithm::Bicubic),
-        Some("direct") => Ok(Algorithm::Direct),
-        Some(other) => Err(reader.error(key, format!("`{}` is not {ALGORITHMS}", excerpt(other)))),
+    let Some(text) = reader.text(key) else { return Ok(Algorithm::Lagrange) };
+    match text.to_ascii_lowercase().as_str() {
+        "lagrange" => Ok(Algorithm::Lagrange),
+        "bicubic" => Ok(Algorithm::Bicubic),
+        "direct" => Ok(Algorithm::Direct),
+        _ => Err(reader.error(key, format!("`{}` is not {ALGORITHMS}", excerpt(&text)))),
     }
 }
 

@@ -429,13 +429,14 @@ const SAVED_MESH: &str = "
 #[test]
 fn meshes_and_skews_are_read_as_they_were_saved() {
     let options = "\n[skew_correction]\n[bed_mesh]\nspeed: 120\nmesh_min: 35, 6\nmesh_max: 240, 198\n\
-        probe_count: 5, 3\nalgorithm: bicubic\nfaulty_region_1_min: 1, 2\nfade_end: 10\nfade_target: 0\n\
+        probe_count: 5, 3\nalgorithm: Bicubic\nsplit_delta_z: 2.0\nfaulty_region_1_min: 1, 2\nfade_end: 10\nfade_target: 0\n\
         zero_reference_position: 20, 10\n";
     let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}{options}{SAVED_MESH}"));
     assert!(diagnostics.iter().all(|it| it.severity == Severity::Info), "{diagnostics:#?}");
     let profiles = config.unwrap().profiles;
     assert_eq!(profiles.skews["calm"], crate::transform::Skew { xy: 0.004, xz: 0.0, yz: 0.0 });
     let mesh = &profiles.meshes["default"];
+    assert_eq!(mesh.z_error, crate::transform::Z_ERROR_MAX_MM);
     let at = |x, y| mesh.machine_from_gcode([x, y, 0.0])[2];
     // Less what it is where Z is to be 0.
     for (place, height) in
@@ -468,16 +469,24 @@ fn a_mesh_that_is_wrong_is_told_what() {
         assert_eq!(config, None, "{new}");
         assert!(diagnostics.iter().any(|it| it.message.contains(told)), "{told}: {diagnostics:#?}");
     }
-    let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}\n[bed_mesh]\nfade_end: 1.1\n{SAVED_MESH}"));
-    assert_eq!(config, None);
-    assert!(
-        diagnostics.iter().any(|it| it.message.contains("fade_end less fade_start is 0.100 mm")),
-        "{diagnostics:#?}"
-    );
     for option in
         ["mesh_min: 5", "probe_count: 2", "mesh_pps: 1,2,3", "algorithm: x", "zero_reference_position: a, b"]
     {
         let (config, _) = parse(&format!("{SMALL_MACHINE}\n[bed_mesh]\n{option}\n"));
         assert_eq!(config, None, "{option}");
+    }
+}
+
+#[test]
+fn a_mesh_that_cannot_be_used_is_left_out_and_told() {
+    for (options, told) in [
+        ("fade_end: 1.1", "fade_end less fade_start is 0.100 mm"),
+        ("fade_end: 10\nfade_target: 5", "fade_target 5.000 mm is not between"),
+    ] {
+        let (config, diagnostics) = parse(&format!("{SMALL_MACHINE}\n[bed_mesh]\n{options}\n{SAVED_MESH}"));
+        let profiles = config.unwrap_or_else(|| panic!("{diagnostics:#?}")).profiles;
+        assert!(profiles.meshes.is_empty() && profiles.skews.contains_key("calm"), "{profiles:?}");
+        let warned = |it: &ConfigDiagnostic| it.severity == Severity::Warning && it.message.contains(told);
+        assert!(diagnostics.iter().any(warned), "{told}: {diagnostics:#?}");
     }
 }

@@ -75,8 +75,10 @@ pub struct Survey {
     layers: Layers,
     /// How it was at the end of that line, once that has been read.
     at_known: Option<Known>,
-    /// The last move was an arc, which is made in pieces.
-    was_arc: bool,
+    /// The line of the journal's last progress: where it is made in pieces, one of them is known to have been made, no more.
+    told: Option<u32>,
+    /// The lowest and highest Z of that line, where it is the last that was read and is made in pieces.
+    in_pieces: Option<[f64; 2]>,
     /// Since then: print time at least, the last line, and the lowest and highest Z.
     since: Seconds,
     reach_line: u32,
@@ -91,8 +93,8 @@ struct Known {
     layer_z: Mm,
     layer_line: u32,
     factors: [f64; 2],
-    /// The line is an arc.
-    is_arc: bool,
+    /// The line may have been made in part.
+    is_in_part: bool,
 }
 
 impl Survey {
@@ -113,7 +115,8 @@ impl Survey {
             source.interpreter.set_axes(Some(x), Some(y), Some(z));
         }
         let before = journal.start_line.map_or(0, |line| line.saturating_sub(1));
-        let known = journal.progress.map_or(0, |(line, _)| line).max(before);
+        let told = journal.progress.map(|(line, _)| line).filter(|&line| line > before);
+        let known = told.unwrap_or(before);
         Ok(Self {
             endstops: config.steppers.each_ref().map(|stepper| stepper.position_endstop.0),
             journal,
@@ -123,7 +126,8 @@ impl Survey {
             known,
             layers: Layers::new(),
             at_known: None,
-            was_arc: false,
+            told,
+            in_pieces: None,
             since: Seconds::ZERO,
             reach_line: known,
             z_range: [f64::INFINITY, f64::NEG_INFINITY],
@@ -199,9 +203,10 @@ impl Survey {
             layer_z: layer.z,
             layer_line: layer.first_line,
             factors: [interpreter.speed_factor(), interpreter.flow_factor()],
-            is_arc: self.was_arc,
+            is_in_part: self.in_pieces.is_some(),
         });
-        self.z_range = [z, z];
+        let [low, high] = self.in_pieces.unwrap_or([z, z]);
+        self.z_range = [low.min(z), high.max(z)];
     }
 
     fn pass(&mut self, action: &Action) {
@@ -214,15 +219,18 @@ impl Survey {
                 if way > 0.0 {
                     self.layers.segment(0, line, extrudes, mv.to.z);
                 }
+                let is_in_pieces = way > 0.0 && self.transform.mesh().is_some();
                 let way = if way > 0.0 { way } else { (mv.to.e - mv.from.e).abs() };
-                self.was_arc = false;
-                Some((way, mv.feed, mv.from.z, mv.to.z))
+                let span = self.span(mv.from.z, mv.to.z);
+                self.in_pieces = (is_in_pieces && self.told == Some(line)).then_some(span);
+                Some((way, mv.feed, span))
             }
             Action::Arc(arc) => {
                 self.layers.segment(0, line, arc.to.e > arc.from.e, arc.to.z);
-                self.was_arc = line == self.known;
                 let [[_, _, low], [_, _, high]] = arc.bounds();
-                Some((arc.length().0, arc.feed, low, high))
+                let span = self.span(low, high);
+                self.in_pieces = (self.told == Some(line)).then_some(span);
+                Some((arc.length().0, arc.feed, span))
             }
             Action::Annotation(Annotation::LayerChange | Annotation::Layer(_)) => {
                 self.layers.announce(line);
@@ -230,8 +238,7 @@ impl Survey {
             }
             Action::Home { x, y, z } => {
                 let axes = machine::homed_together(&self.config, [*x, *y, *z]);
-                let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.endstops[axis]));
-                self.source.interpreter.set_axes(x, y, z);
+                self.transform.home(&mut self.source.interpreter, axes, self.endstops);
                 None
             }
             Action::Skew(_) | Action::BedMesh(_) => {
@@ -241,16 +248,21 @@ impl Survey {
             }
             _ => None,
         };
-        if let Some((way, feed, from_z, to_z)) = interval.filter(|_| self.at_known.is_some()) {
+        if let Some((way, feed, span)) = interval.filter(|_| self.at_known.is_some()) {
             self.reach_line = line;
             let [low, high] = self.z_range;
-            let [least, most] = self.transform.added_to_z();
-            self.z_range = [low.min(from_z.min(to_z) + least), high.max(from_z.max(to_z) + most)];
+            self.z_range = [low.min(span[0]), high.max(span[1])];
             // Without acceleration it is faster than it can have been.
             let speed = feed.0.min(self.config.printer.max_velocity.0).max(f64::MIN_POSITIVE);
             self.since += Seconds(way / speed);
             self.is_done = self.since > REACH || line > self.known.saturating_add(REACH_LINES_MAX);
         }
+    }
+
+    /// The lowest and highest Z that the machine can have on a way between two heights of the file.
+    fn span(&self, one: f64, other: f64) -> [f64; 2] {
+        let [least, most] = self.transform.added_to_z();
+        [one.min(other) + least, one.max(other) + most]
     }
 
     /// What was found out, once nothing more is wanted.
@@ -262,8 +274,7 @@ impl Survey {
             Some(MovedBy::Nobody) => height.map(|height| [height.z, height.z]),
             Some(MovedBy::File) | None => Some(self.z_range),
         };
-        // A piece of it is known to have been made, no more.
-        let again = u32::from(known.is_arc);
+        let again = u32::from(known.is_in_part);
         Some(Interruption {
             line: self.known,
             start_line: (self.known + 1 - again).max(1),

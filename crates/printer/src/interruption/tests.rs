@@ -17,15 +17,24 @@ fn config() -> PrinterConfig {
 }
 
 fn journal(start_line: Option<u32>, records: &[Record]) -> Journal {
+    journal_of(&config(), crate::transform::TransformRecord::default(), start_line, records)
+}
+
+fn journal_of(
+    config: &PrinterConfig,
+    transform: crate::transform::TransformRecord,
+    start_line: Option<u32>,
+    records: &[Record],
+) -> Journal {
     let mut writer = Writer::default();
     writer.write(&Record::Began {
         format: FORMAT,
         print: 7,
-        machine: machine_check(&config()),
+        machine: machine_check(config),
         clock: 12_000_000,
         position: [0.0; 4],
         homed: [false; 3],
-        transform: crate::transform::TransformRecord::default(),
+        transform,
         confirmed: [].into(),
         confirm_all: false,
         start_line,
@@ -45,9 +54,13 @@ fn at(line: u32) -> [Record; 2] {
 }
 
 fn surveyed(journal: Journal) -> Result<Interruption, PrinterError> {
-    let mut survey = Survey::new(&config(), journal)?;
+    surveyed_of(&config(), FILE, journal)
+}
+
+fn surveyed_of(config: &PrinterConfig, file: &str, journal: Journal) -> Result<Interruption, PrinterError> {
+    let mut survey = Survey::new(config, journal)?;
     // In small pieces, as from a disk.
-    for piece in FILE.as_bytes().chunks(7) {
+    for piece in file.as_bytes().chunks(7) {
         if survey.wants() == 0 {
             break;
         }
@@ -80,6 +93,36 @@ fn line_and_layer_are_told() {
     // Of a print that was begun with a line it is none before.
     let found = surveyed(journal(Some(10), &at(12))).unwrap();
     assert_eq!((found.line, found.position), (12, [Mm(12.0), Mm(50.0), Mm(0.4)]));
+}
+
+/// Of a line over a mesh only the first of many pieces is known to have been made.
+#[test]
+fn a_move_in_pieces_may_have_been_made_in_part() {
+    const BED: &str = "\n[bed_mesh]\n[bed_mesh cold]\npoints:\n  0.2, 0.1, 0.0\n  0.1, 0.0, 0.1\n  -0.1, 0.0, 0.3\n\
+        x_count: 3\ny_count: 3\nmin_x: 0\nmax_x: 100\nmin_y: 0\nmax_y: 100\n";
+    const LONG: &str =
+        "G28\nM83\nG1 Z1 F600\nG1 X10 Y10 F6000\nG1 X190 E9 F1200\nG1 X10 E9\nG1 E-1\nG1 Y90 E4 F60\n";
+    let config = crate::config::parse(&format!("{MACHINE}{BED}"));
+    let config = config.0.unwrap_or_else(|| panic!("{:?}", config.1));
+    let mesh = || crate::transform::TransformRecord { mesh: Some("cold".into()), ..Default::default() };
+    let found = |transform, start_line, records: &[Record]| {
+        surveyed_of(&config, LONG, journal_of(&config, transform, start_line, records)).unwrap()
+    };
+    let long = found(mesh(), None, &at(5));
+    assert_eq!((long.line, long.start_line), (5, 5));
+    let [low, high] = long.z_range.unwrap();
+    assert!(low <= Mm(0.9) && high >= Mm(1.3), "{low} {high}");
+    // The last of the file: what is behind it says nothing of Z.
+    let last = found(mesh(), None, &at(8));
+    assert_eq!((last.line, last.start_line), (8, 8));
+    let [low, high] = last.z_range.unwrap();
+    assert!(low <= Mm(0.9) && high >= Mm(1.3), "{low} {high}");
+    // Filament alone is one piece, and so is every line over no mesh.
+    assert_eq!(found(mesh(), None, &at(7)).start_line, 8);
+    let none = crate::transform::TransformRecord::default();
+    assert_eq!(found(none, None, &at(5)).start_line, 6);
+    // What was passed over was not made in part.
+    assert_eq!(found(mesh(), Some(6), &[]).start_line, 6);
 }
 
 #[test]

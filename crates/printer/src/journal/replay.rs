@@ -359,9 +359,7 @@ impl Replay {
                 for axis in (0..3).filter(|&axis| axes[axis]) {
                     self.planner.set_axis(axis, self.endstops[axis], true);
                 }
-                let position = self.planner.position();
-                let [x, y, z] = core::array::from_fn(|axis| axes[axis].then_some(position[axis]));
-                self.source.interpreter.set_axes(x, y, z);
+                self.planner.tell_homed(axes, &mut self.source);
             }
             Barrier::WaitTemperature { heater, target, .. } => self.set_target(heater, target),
             Barrier::MotorsOff(motors) => {

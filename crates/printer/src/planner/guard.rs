@@ -131,10 +131,11 @@ impl Guard {
         }
         let travel = [mv.to.x - mv.from.x, mv.to.y - mv.from.y, mv.to.z - mv.from.z];
         let length = libm::sqrt(travel.iter().map(|d| d * d).sum());
+        let is_on_the_spot = length < ON_THE_SPOT_MM;
         // Filament that is pulled back while the head travels is not laid along the way either.
-        if length == 0.0 || filament < 0.0 {
+        if is_on_the_spot || filament < 0.0 {
             if filament.abs() > extruder.extrude_only_max_mm {
-                let how = if length == 0.0 { "without travel" } else { "pulled back" };
+                let how = if is_on_the_spot { "without travel" } else { "pulled back" };
                 return fail(
                     ErrorCode::ExtrusionTooLong,
                     format!(
@@ -161,5 +162,7 @@ impl Guard {
     }
 }
 
+/// What offsets and inches leave of a place that is named again is no way, in mm.
+const ON_THE_SPOT_MM: f64 = 1e-6;
 /// See [`Guard::judge`]: extrusion over less than this travel is not judged by its ratio, in mm.
 const DAB_MM: f64 = 0.4;

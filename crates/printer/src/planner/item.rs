@@ -44,7 +44,7 @@ pub enum TimedAction {
 /// Something that the machine must be at rest for, and that may take any time.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Barrier {
-    /// Home these axes; the owner then calls [`Planner::set_axis`] and the interpreter's `set_axes`.
+    /// Home these axes; the owner then calls [`Planner::set_axis`] and [`Planner::tell_homed`].
     Home([bool; 3]),
     /// Set a target and wait until the heater is there.
     WaitTemperature {

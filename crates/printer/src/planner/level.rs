@@ -3,11 +3,12 @@
 //! A line that changes what is in force moves nothing: the head stands where it stands, and the next move leads from there to
 //! where that line's coordinates are now. A move of the filament alone leaves the head where it is.
 
-use gcode::{Action, LineNumber, Move};
+use gcode::{Action, Arc, CHORD_TOLERANCE, LineNumber, Move};
 
 use super::{Planner, Position, Said, Source, source::Piece};
 use crate::{
     error::{ErrorCode, PrinterError},
+    machine::EXTRUDER,
     transform::{Pieces, Transform, TransformRecord},
 };
 
@@ -64,37 +65,54 @@ impl Planner {
         self.transform.set(action, &self.profiles).map_err(|problem| no_profile(problem).at_line(line.0))
     }
 
+    /// Tells a source that these axes have been homed, and stand where they stand.
+    pub fn tell_homed(&self, axes: [bool; 3], source: &mut Source) {
+        let [x, y, z, _] = self.position;
+        self.transform.set_homed(&mut source.interpreter, axes, [x, y, z]);
+    }
+
     /// Judges a move as a whole, and has it made piece by piece.
     pub(super) fn judge_and_take_apart(
         &mut self,
         mv: &Move,
         source: &mut Source,
     ) -> Result<(), PrinterError> {
-        let [x, y, z, e] = self.position;
-        let from = self.begin_of(mv);
-        let to_e = mv.to.e + source.e_offset;
-        let begin = gcode::Position { x: from[0], y: from[1], z: from[2], e: e - source.e_offset };
-        let [was, is] = [mv.from, mv.to].map(|at| [at.x, at.y, at.z]);
-        if was == is {
-            self.guard.judge_extrusion(&Move {
-                from: begin,
-                to: gcode::Position { e: mv.to.e, ..begin },
-                ..*mv
-            })?;
-            let piece = Piece { to: [x, y, z, to_e], feed: mv.feed, line: mv.line };
-            return self.push_piece(&piece, source);
-        }
-        self.guard.judge_extrusion(&Move { from: begin, ..*mv })?;
-        let pieces = self.transform.pieces([from[0], from[1], from[2], e], [is[0], is[1], is[2], to_e]);
-        self.judge_pieces(pieces.clone(), mv, source)?;
+        let (pieces, _) = self.judge_line(self.position, mv, source)?;
         source.take_apart(pieces, mv.feed, mv.line);
         Ok(())
     }
 
+    /// The same of all that an arc is made of.
+    pub(super) fn judge_chords(&self, arc: &Arc, source: &Source) -> Result<(), PrinterError> {
+        let mut at = self.position;
+        let mut chords = arc.chords(CHORD_TOLERANCE);
+        while let Some(piece) = chords.next_piece() {
+            (_, at) = self.judge_line(at, &piece.chord, source)?;
+        }
+        Ok(())
+    }
+
+    /// Judges a straight move of the G-code from where the machine is by then: its pieces, and where the last one ends.
+    fn judge_line(
+        &self,
+        at: Position,
+        mv: &Move,
+        source: &Source,
+    ) -> Result<(Pieces, Position), PrinterError> {
+        let [x, y, z] = self.begin_of(at, mv);
+        let e = at[EXTRUDER];
+        let begin = gcode::Position { x, y, z, e: e - source.e_offset };
+        self.guard.judge_extrusion(&Move { from: begin, ..*mv })?;
+        let to = [mv.to.x, mv.to.y, mv.to.z, mv.to.e + source.e_offset];
+        let pieces = self.transform.pieces([x, y, z, e], to);
+        let end = self.judge_pieces(at, pieces.clone(), mv, source)?;
+        Ok((pieces, end))
+    }
+
     /// Where a move begins in the G-code's coordinates: to the bit where the line before left it, unless the head stands
     /// elsewhere.
-    fn begin_of(&self, mv: &Move) -> [f64; 3] {
-        let [x, y, z, _] = self.position;
+    fn begin_of(&self, at: Position, mv: &Move) -> [f64; 3] {
+        let [x, y, z, _] = at;
         let said = [mv.from.x, mv.from.y, mv.from.z];
         let at = self.transform.machine_from_gcode(said);
         let is_there = at.into_iter().zip([x, y, z]).all(|(one, other)| (one - other).abs() < DUST_MM);
@@ -102,20 +120,25 @@ impl Planner {
     }
 
     /// No piece of a move is made where one of them may not.
-    fn judge_pieces(&self, pieces: Pieces, mv: &Move, source: &Source) -> Result<(), PrinterError> {
-        let mut at = self.position;
-        let interpreter = &source.interpreter;
-        let is_slowed = interpreter.speed_factor() > 1.0 || interpreter.flow_factor() > 1.0;
+    fn judge_pieces(
+        &self,
+        mut at: Position,
+        pieces: Pieces,
+        mv: &Move,
+        source: &Source,
+    ) -> Result<Position, PrinterError> {
         for to in pieces {
             let to = undusted(at, to);
             self.guard.judge_travel([at[0], at[1], at[2]], [to[0], to[1], to[2]], mv.line)?;
-            let feed = if is_slowed { self.step_rates.slowed(at, to, mv.feed) } else { mv.feed };
             if to != at {
+                let feed =
+                    if source.is_sped_up() { self.step_rates.slowed(at, to, mv.feed) } else { mv.feed };
+                self.reject_torque(at, to, feed, mv.line)?;
                 self.step_rates.judge_request(at, to, feed, &self.limits, mv.line)?;
             }
             at = to;
         }
-        Ok(())
+        Ok(at)
     }
 
     /// Plans a piece of a move that has been judged.

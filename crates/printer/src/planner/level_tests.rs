@@ -176,3 +176,107 @@ fn what_was_fed_and_not_made_is_forgotten_with_its_pieces() {
     assert_eq!(made(&mut planner, &mut source, "G1 X100 Y100 Z5\n").1, None);
     assert_at(planner.position(), [100.0, 100.0, 4.6]);
 }
+
+#[test]
+fn filament_alone_leaves_the_head_where_what_was_cleared_had_it() {
+    let (mut planner, mut source) = planner();
+    let text = "G1 X10 Y10 Z0.3 F6000\nBED_MESH_PROFILE LOAD=flat\nG1 X60\nBED_MESH_CLEAR\n";
+    assert_eq!(made(&mut planner, &mut source, text).1, None);
+    for (text, filament) in [("G1 E-2 F600\n", -2.0), ("G1 E5\n", 5.0)] {
+        let (moves, error) = made(&mut planner, &mut source, text);
+        assert_eq!((moves.len(), error), (1, None), "{text}");
+        assert_at(planner.position(), [60.0, 10.0, 0.4]);
+        assert!((planner.position()[3] - filament).abs() < 1e-12, "{text}");
+    }
+    let text = "SKEW_PROFILE LOAD=lean\nG1 Y50 F6000\nSET_SKEW CLEAR=1\nG1 E3\n";
+    assert_eq!(made(&mut planner, &mut source, text).1, None);
+    assert_at(planner.position(), [59.0, 50.0, 0.3]);
+}
+
+#[test]
+fn after_homing_the_g_code_stands_where_the_skew_has_it() {
+    let (mut planner, mut source) = planner();
+    let text = "SKEW_PROFILE LOAD=lean\nG1 X60 Y50 Z5 F6000\nG92 X0\nG28 Y\n";
+    assert_eq!(made(&mut planner, &mut source, text).1, None);
+    planner.set_axis(1, 200.0, true);
+    planner.tell_homed([false, true, false], &mut source);
+    let here = planner.position();
+    assert_at(here, [59.0, 200.0, 5.0]);
+    let [x, y, z, _] = planner.gcode_position();
+    let at = source.interpreter.position();
+    assert_at([at.x, at.y, at.z, 0.0], [x, y, z]);
+    // Moves of one axis are moves of one axis, and the offset of the axis that was not homed holds.
+    assert_eq!(made(&mut planner, &mut source, "G1 Z6\n").1, None);
+    assert_at(planner.position(), [59.0, 200.0, 6.0]);
+    assert_eq!(made(&mut planner, &mut source, "G1 X0 Y100\n").1, None);
+    assert_at(planner.position(), [58.0, 100.0, 6.0]);
+    // Without a skew the endstop's place is told as it is, on a bed that is not flat too.
+    let text = "SET_SKEW CLEAR=1\nBED_MESH_PROFILE LOAD=flat\nG1 X40 Y40 Z3\nG28 Z\n";
+    assert_eq!(made(&mut planner, &mut source, text).1, None);
+    planner.set_axis(2, 0.0, true);
+    planner.tell_homed([false, false, true], &mut source);
+    assert_eq!(source.interpreter.position().z, 0.0);
+}
+
+#[test]
+fn a_factor_that_is_lowered_in_the_middle_of_a_line_holds_from_the_next() {
+    // 2257 steps/mm of filament: with pulses of 2 µs 110 mm/s are the most.
+    let text = include_str!("../../../../samples/printer.cfg");
+    let fine = text.replacen("rotation_distance: 22.6789511", "rotation_distance: 1.41743444", 1);
+    let config = config::parse(&format!("{fine}{BED}")).0.expect("a machine");
+    let load = "BED_MESH_PROFILE LOAD=hole\n";
+    for (load, way) in [(load, "G1 X150"), ("", "G3 X150 I50 J0"), (load, "G3 X150 I50 J0")] {
+        let mut planner = Planner::new(&config, CLOCK).unwrap();
+        (0..3).for_each(|axis| planner.set_axis(axis, 0.0, true));
+        planner.guard.extrusion = ExtrusionPermit::Allowed;
+        let mut source = Source::default();
+        planner.begin_job(&mut source);
+        let text = format!("{load}G1 X50 Y50 Z10 F6000\nM83\n");
+        assert_eq!(made(&mut planner, &mut source, &text).1, None);
+        source.set_speed_factor(3.0);
+        let filament = if way.starts_with("G1") { 75.0 } else { 118.0 };
+        source.feed(format!("{way} E{filament} F7200\n").as_bytes());
+        while planner.position()[3] == 0.0 {
+            planner.next(&mut source).unwrap();
+        }
+        assert!(planner.position()[3] < 0.9 * filament, "{way}: the factor changes in its middle");
+        source.set_speed_factor(1.0);
+        assert_eq!(made(&mut planner, &mut source, "").1, None, "{load}{way}");
+        assert!((planner.position()[3] - filament).abs() < 1e-9, "{way}");
+        // The next line is as the file has it: too fast is refused.
+        let error = made(&mut planner, &mut source, "G1 X50 E75 F12000\n").1.map(|error| error.code);
+        assert_eq!(error, Some(ErrorCode::StepRateTooHigh), "{load}{way}");
+    }
+}
+
+#[test]
+fn an_arc_over_the_bed_is_refused_before_it_starts() {
+    let (mut planner, mut source) = planner();
+    let text = "G1 X116.57 Y60 Z5 F6000\nBED_MESH_PROFILE LOAD=hole\nG1 Z0.35\n";
+    assert_eq!(made(&mut planner, &mut source, text).1, None);
+    // Only between its ends, over the deepest place, Z would be below 0.
+    let (moves, error) = made(&mut planner, &mut source, "G3 X60 Y116.57 I-56.57 J0\n");
+    assert_eq!((moves.len(), error.map(|error| error.code)), (0, Some(ErrorCode::MoveOutOfRange)));
+    planner.correct(&mut source);
+    // Where the bed is deep, but nowhere too deep, nothing is refused.
+    assert_eq!(made(&mut planner, &mut source, "G1 X116.57 Y60 Z0.41\nG3 X60 Y116.57 I-56.57 J0\n").1, None);
+}
+
+#[test]
+fn what_the_torque_does_not_last_for_is_refused_before_it_starts() {
+    let text = include_str!("../../../../samples/printer.cfg")
+        .replace("[printer]", "[printer]\nunreachable_speed: reject");
+    let torque = "\n[motor_torque stepper_x]\npull_out_torque: 0: 0.4, 1000: 0.2\ninertia: 100\n";
+    let config = config::parse(&format!("{text}{torque}{BED}")).0.expect("a machine");
+    let mut planner = Planner::new(&config, CLOCK).unwrap();
+    (0..3).for_each(|axis| planner.set_axis(axis, 0.0, true));
+    let mut source = Source::default();
+    planner.begin_job(&mut source);
+    let text = "G1 X150 Y100 Z5 F3000\nBED_MESH_PROFILE LOAD=hole\nG1 Z6\n";
+    assert_eq!(made(&mut planner, &mut source, text).1, None);
+    // It begins along Y, and is along X a quarter later.
+    let (moves, error) = made(&mut planner, &mut source, "G3 X50 I-50 J0 F18000\n");
+    let error = error.expect("it is refused");
+    assert_eq!((moves.len(), error.code, error.line), (0, ErrorCode::StepRateTooHigh, Some(4)));
+    assert_at(planner.gcode_position(), [150.0, 100.0, 6.0]);
+}

@@ -351,7 +351,7 @@ impl Planner {
         match action {
             Action::Move(mv) => self.judge_and_push(&mv, None, source)?,
             Action::Arc(arc) => {
-                self.judge_arc(&arc)?;
+                self.judge_arc(&arc, source)?;
                 source.draw(&arc);
             }
             Action::VelocityLimit(limit) => self.limit(limit),

@@ -318,8 +318,7 @@ impl PlanStream {
                 for axis in (0..3).filter(|&axis| axes[axis]) {
                     self.planner.set_axis(axis, 0.0, true);
                 }
-                let at = |axis: usize| axes[axis].then_some(0.0);
-                self.source.interpreter.set_axes(at(0), at(1), at(2));
+                self.planner.tell_homed(*axes, &mut self.source);
             }
             Barrier::Dwell(_)
             | Barrier::WaitTemperature { .. }

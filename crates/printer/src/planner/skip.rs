@@ -141,8 +141,7 @@ impl Skip {
             Action::PressureAdvance { .. } | Action::InputShaper(_) => planner.set_dynamics(action),
             Action::Home { x, y, z } => {
                 let axes = planner.homed_together([x, y, z]);
-                let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.endstops[axis]));
-                source.interpreter.set_axes(x, y, z);
+                planner.transform().home(&mut source.interpreter, axes, self.endstops);
             }
             Action::Cancel | Action::EmergencyStop => {
                 let detail = format!("the file ends the print before line {}", self.until.0);

@@ -31,6 +31,8 @@ pub struct Source {
     line: LineNumber,
     /// The speed factor of that line's moves.
     pace: Pace,
+    /// Whether a factor may have made them faster than the file asks.
+    is_sped_up: bool,
     /// As the user set it last.
     wanted: Pace,
 }
@@ -83,6 +85,7 @@ impl Source {
             e_offset: 0.0,
             line: LineNumber(0),
             pace: Pace::default(),
+            is_sped_up: false,
             wanted: Pace::default(),
         }
     }
@@ -118,6 +121,7 @@ impl Source {
         by[axis] = distance.0;
         self.line = LineNumber(0);
         self.next_action = 0;
+        self.is_sped_up = false;
         self.actions = vec![Action::Move(self.interpreter.move_by(by, feed))];
     }
 
@@ -155,6 +159,11 @@ impl Source {
     /// That of the moves of the line that was read last.
     pub(super) const fn pace(&self) -> Pace {
         self.pace
+    }
+
+    /// Whether a factor may have made the moves of that line faster than the file asks, however it is set by now.
+    pub(super) const fn is_sped_up(&self) -> bool {
+        self.is_sped_up
     }
 
     /// Forgets everything that was fed and not yet read.
@@ -230,6 +239,7 @@ impl Source {
             self.diagnostics.reverse();
             let factor = self.interpreter.speed_factor();
             self.pace = Pace { factor, changes: self.wanted.changes };
+            self.is_sped_up = factor > 1.0 || self.interpreter.flow_factor() > 1.0;
         }
     }
 }

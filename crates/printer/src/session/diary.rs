@@ -3,6 +3,9 @@
 //! Knows when something is to be written, not what it means: that is [`crate::journal`]. A job that keeps none leaves
 //! everything here at rest.
 
+#[cfg(test)]
+mod tests;
+
 use units::{Seconds, Ticks};
 use wire::Command;
 
@@ -23,6 +26,9 @@ const NO_JOB: u32 = 0;
 const HEARD_LATE: Seconds = Seconds(0.1);
 /// Position and count of an axis agree to so many microsteps: both are rounded.
 const ROUNDING_STEPS: f64 = 1.5;
+/// Heights that are nearer than this, in mm, are one: half a usual layer. Over a bed that is not flat, each piece of a line
+/// ends at another height.
+const SAME_HEIGHT_MM: f64 = 0.05;
 
 /// See the module.
 #[derive(Debug, Default)]
@@ -265,7 +271,8 @@ impl Diary {
     /// what has been made already goes through it.
     pub(super) fn tell_progress(&mut self, now: Seconds) {
         let is_due = |job: &Job| {
-            let is_new_height = job.made.is_some_and(|made| made.z != job.told_z);
+            let is_told = |z: f64| (z - job.told_z).abs() <= SAME_HEIGHT_MM;
+            let is_new_height = job.made.is_some_and(|made| !is_told(made.z));
             now - job.told >= if is_new_height { HEIGHT_INTERVAL } else { PROGRESS_INTERVAL }
         };
         if self.job.as_ref().is_some_and(is_due) {

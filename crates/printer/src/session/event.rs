@@ -266,7 +266,7 @@ pub enum Request {
         /// How fast.
         speed: MmPerS,
     },
-    /// An axis, 0, 1, 2 for X, Y, Z, stands there: the user says so, and it counts as homed.
+    /// An axis, 0, 1, 2 for X, Y, Z, stands there in the G-code's coordinates: the user says so, and it counts as homed.
     SetPosition {
         /// Which.
         axis: usize,

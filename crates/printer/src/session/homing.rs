@@ -5,7 +5,6 @@
 //! The board's trigger fires by itself when the host falls silent, so a lost link stops the axis. Where that was but a
 //! bad moment of the line, the axis goes on from where it stands, a few times: no further altogether than one approach goes.
 
-use steps::Geometry;
 use units::{Seconds, Ticks};
 use wire::Command;
 
@@ -13,10 +12,10 @@ use super::board::Board;
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
-    machine::{self, MOTORS},
+    machine::{self, MOTORS, Motors},
     reach::AXES,
 };
-pub(super) use parts::{HomingMove, Wish};
+pub(super) use parts::{HomingMove, Standing, Wish};
 use parts::{Mover, Stage, Stop};
 
 mod parts;
@@ -63,7 +62,8 @@ pub(super) struct AxisHoming {
     pub(super) home_mm: [f64; 3],
     stops: Vec<Stop>,
     movers: Vec<Mover>,
-    geometry: Geometry,
+    motors: Motors,
+    standing: Standing,
     stage: Stage,
     second: bool,
     cancelled: bool,
@@ -85,7 +85,12 @@ pub(super) struct AxisHoming {
 }
 
 impl AxisHoming {
-    pub(super) fn new(axis: usize, config: &PrinterConfig, board: &Board) -> Option<Self> {
+    pub(super) fn new(
+        axis: usize,
+        config: &PrinterConfig,
+        board: &Board,
+        standing: Standing,
+    ) -> Option<Self> {
         let axes = machine::homed_together(config, core::array::from_fn(|it| it == axis));
         // Towers that are homed together all move as Z does.
         let axis = if axes == [true; 3] { 2 } else { axis };
@@ -97,7 +102,8 @@ impl AxisHoming {
             home_mm: config.steppers.each_ref().map(|stepper| stepper.position_endstop.0),
             stops,
             movers,
-            geometry: machine::geometry(config),
+            motors: Motors::new(config),
+            standing,
             stage: Stage::PositionBefore,
             second: false,
             cancelled: false,
@@ -117,6 +123,11 @@ impl AxisHoming {
     /// Where the axis is once it is home, in mm.
     pub(super) const fn position_mm(&self) -> f64 {
         self.home_mm[self.axis]
+    }
+
+    /// How far the other axes are from where the planner has them, in mm.
+    pub(super) const fn off_mm(&self) -> [f64; 3] {
+        self.standing.off_mm
     }
 
     /// Steps that each motor has made in both approaches, as the board counted them.
@@ -220,7 +231,7 @@ impl AxisHoming {
                 self.ask(questions, board, now)?;
                 Ok(Wish::Wait)
             }
-            Stage::PlanStraight(by) => Ok(Wish::Straighten(by)),
+            Stage::PlanStraight(missing) => Ok(Wish::Straighten(missing)),
             Stage::Straight => {
                 if at_rest {
                     self.enter(Stage::Done);
@@ -255,45 +266,11 @@ impl AxisHoming {
         for index in 0..self.stops.len() {
             self.stops[index] =
                 Stop { has_fired: false, heard: now, is_released: false, ..self.stops[index] };
-            self.arm(index, start, rest, board);
+            self.stops[index].arm(index, &self.movers, start, rest, board);
         }
         self.tries += 1;
         self.apart = false;
         self.enter(Stage::Approach { start, end: None, kept_alive: now });
-    }
-
-    /// Arms a switch: its motors stop when it closes.
-    fn arm(&self, stop: usize, start: Ticks, rest: Seconds, board: &mut Board) {
-        let oids = self.stops[stop].oids;
-        let (trsync, clock) = (oids.trsync.0, start.low().0);
-        board.control(&Command::TrsyncStart {
-            oid: trsync,
-            report_clock: clock,
-            report_ticks: board.ticks(REPORT).0 as u32,
-            expire_reason: REASON_EXPIRED,
-        });
-        for mover in self.movers.iter().filter(|mover| mover.stop == stop) {
-            board.control(&Command::StepperStopOnTrigger { oid: mover.oid, trsync_oid: trsync });
-        }
-        board.control(&Command::TrsyncSetTimeout {
-            oid: trsync,
-            clock: (start + board.ticks(EXPIRE)).low().0,
-        });
-        board.control(&Command::EndstopHome {
-            oid: oids.endstop.0,
-            clock,
-            sample_ticks: board.ticks(SAMPLE).0 as u32,
-            sample_count: SAMPLES,
-            rest_ticks: board.ticks(rest).0 as u32,
-            pin_value: u8::from(!oids.inverted),
-            trsync_oid: trsync,
-            trigger_reason: REASON_ENDSTOP,
-        });
-    }
-
-    /// Nothing has to be moved back.
-    pub(super) fn is_straight(&mut self) {
-        self.enter(Stage::Done);
     }
 
     /// The approach has been planned to its end.
@@ -332,8 +309,8 @@ impl AxisHoming {
             }
         }
         let overdue = end.is_some_and(|end| clock_now > end + board.ticks(REPORT));
-        // Not before the steps have begun: a stepper that is stopped first would start with them all the same.
-        let stop_wanted = self.cancelled && clock_now > start + board.ticks(REPORT);
+        // Where one motor has stopped for want of a word, the others do not go on alone. Not before the steps have begun: a stepper that is stopped first would start with them all the same.
+        let stop_wanted = (self.cancelled || self.expired) && clock_now > start + board.ticks(REPORT);
         if overdue || stop_wanted {
             // Answered with the reason that it fired for first, should it have fired already.
             let stop = |stop: &Stop| Command::TrsyncTrigger { oid: stop.oids.trsync.0, reason: REASON_HOST };
@@ -368,14 +345,19 @@ impl AxisHoming {
         }
         if can_trigger {
             stop.heard = now;
-            self.asked = self.asked.filter(|_| self.cancelled);
+            self.asked = self.asked.filter(|_| self.cancelled || self.expired);
             return Ok(());
         }
         match reason {
             REASON_ENDSTOP => {}
             _ if self.cancelled => {}
-            REASON_EXPIRED if self.tries < TRIES_MAX && !self.apart => self.expired = true,
+            REASON_EXPIRED if self.tries < TRIES_MAX && !self.apart => {
+                self.expired = true;
+                self.asked = None;
+            }
             REASON_EXPIRED => return Err(self.fail(ErrorCode::HomingTimeout, NOT_HEARD)),
+            // Told to stop, because another one has.
+            _ if self.expired => {}
             _ => return Err(self.fail(ErrorCode::EndstopNotReached, "")),
         }
         stop.has_fired = true;
@@ -383,6 +365,13 @@ impl AxisHoming {
             self.stopped(board);
         }
         Ok(())
+    }
+
+    /// It has failed: whatever still moves is stopped.
+    pub(super) fn stop_all(&self, board: &mut Board) {
+        if matches!(self.stage, Stage::Approach { .. }) {
+            self.armed().for_each(|stop| stop.trigger(board));
+        }
     }
 
     /// Every motor has been stopped.
@@ -426,7 +415,7 @@ impl AxisHoming {
                     self.asked = None;
                 } else {
                     // The report that it fired was lost: have it repeated, with its reason.
-                    board.control(&Command::TrsyncTrigger { oid: stop.oids.trsync.0, reason: REASON_HOST });
+                    stop.trigger(board);
                 }
                 Ok(())
             }
@@ -480,11 +469,16 @@ impl AxisHoming {
             return Err(self.fail(ErrorCode::EndstopBeforeMove, "on its second approach"));
         }
         let again = !self.second && self.retract_mm > 0.0;
-        let drift = parts::drift(self.axis, &self.movers, &self.geometry);
-        self.enter(match drift {
-            _ if again => Stage::PlanRetract,
-            [0.0, 0.0, 0.0] => Stage::Done,
-            drift => Stage::PlanStraight(drift),
+        if again {
+            self.enter(Stage::PlanRetract);
+            return Ok(());
+        }
+        let (missing, off_mm) =
+            parts::missing(self.axis, self.position_mm(), &self.movers, &self.motors, &self.standing);
+        self.standing.off_mm = off_mm;
+        self.enter(match missing {
+            [0, 0, 0, 0] => Stage::Done,
+            missing => Stage::PlanStraight(missing),
         });
         Ok(())
     }

@@ -206,6 +206,14 @@ impl Session {
         }
     }
 
+    /// How much higher Z's motor stands than the Z of [`Self::position`], in mm: what makes up for the bed there.
+    pub fn z_lift(&self) -> f64 {
+        match &self.stage {
+            Stage::Ready(ready) => ready.planner.position()[2] - ready.planner.gcode_position()[2],
+            _ => 0.0,
+        }
+    }
+
     /// The speed and flow factors of what is planned from now on, 1 is as written: the job's, or those of what is typed.
     pub fn factors(&self) -> [f64; 2] {
         match &self.stage {
@@ -259,7 +267,7 @@ impl Ready {
         }
     }
 
-    /// Takes the user's word for where an axis stands.
+    /// Takes the user's word for where an axis stands, in the G-code's coordinates, as [`Session::position`] tells it.
     fn set_position(&mut self, axis: usize, position: Mm) -> Result<(), PrinterError> {
         self.idle_console()?;
         if self.is_console_busy() {
@@ -275,11 +283,34 @@ impl Ready {
             let detail = "where a delta's head is cannot be said axis by axis: home it, it goes upwards";
             return Err(PrinterError::new(ErrorCode::NotHomed, detail));
         }
+        let place = self.motors_place(axis, position)?;
         self.diary.lose_place(&mut self.board);
-        self.planner.set_axis(axis, position.0, true);
+        self.planner.set_axis(axis, place, true);
         self.note_height(self.planner.position()[2], MovedBy::Others);
         self.planner.correct(&mut self.console.source);
         Ok(())
+    }
+
+    /// Where an axis has its motor where it stands there in the G-code's coordinates; the other motors stay.
+    fn motors_place(&self, axis: usize, position: Mm) -> Result<f64, PrinterError> {
+        let transform = self.planner.transform();
+        if transform.is_identity() {
+            return Ok(position.0);
+        }
+        if axis < 2 && transform.has_skew() && self.planner.guard.homed() != [true; 3] {
+            let detail = "while a skew is made up for, X and Y follow from one another and from Z: home them, or \
+                take the skew back first (SET_SKEW CLEAR=1)";
+            return Err(PrinterError::new(ErrorCode::NotHomed, detail));
+        }
+        let [x, y, z, _] = self.planner.position();
+        let place = transform.motors_place([x, y, z], axis, position.0);
+        let stepper = &self.config.steppers[axis];
+        if (stepper.position_min.0..=stepper.position_max.0).contains(&place) {
+            Ok(place)
+        } else {
+            let detail = format!("an axis cannot stand at {position} over a bed that is not flat");
+            Err(PrinterError::new(ErrorCode::MoveOutOfRange, detail))
+        }
     }
 
     /// A factor of what is planned from now on. What lines set that are passed over does not override it.

@@ -14,7 +14,7 @@ mod tests;
 use core::fmt::Write as _;
 use std::{collections::BTreeMap, sync::Arc};
 
-use gcode::{Action, MeshChange, SkewChange};
+use gcode::{Action, Interpreter, MeshChange, SkewChange};
 use serde::{Deserialize, Serialize};
 
 pub use mesh::{Fade, Mesh, MeshError, Z_ERROR_MAX_MM};
@@ -24,6 +24,8 @@ pub use surface::{Cell, GridAxis, Interpolation, LAGRANGE_POINTS_MAX, Surface};
 
 /// A mesh with more points than this along an axis is not written out.
 const WRITTEN_POINTS_MAX: usize = 32;
+/// So often a motor's place is bettered: each time what is missing becomes a tenth or less.
+const MOTORS_PLACE_ROUNDS: u32 = 12;
 
 /// What the machine file has that can be loaded.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -72,6 +74,11 @@ impl Transform {
     /// Whether the machine goes where the G-code says.
     pub fn is_identity(&self) -> bool {
         self.mesh.is_none() && self.skew == Skew::default()
+    }
+
+    /// Whether axes that are not square are made up for.
+    pub fn has_skew(&self) -> bool {
+        self.skew != Skew::default()
     }
 
     /// The bed, where it is made up for.
@@ -152,6 +159,46 @@ impl Transform {
             return place;
         }
         self.skew.gcode_from_machine(self.mesh().map_or(place, |mesh| mesh.gcode_from_machine(place)))
+    }
+
+    /// Where one motor has to stand, while the others stay at `motors`, for the head to be at `wanted` on that axis in the
+    /// G-code's coordinates.
+    pub fn motors_place(&self, mut motors: [f64; 3], axis: usize, wanted: f64) -> f64 {
+        if self.is_identity() {
+            return wanted;
+        }
+        if axis == 2 {
+            // A skew leaves Z as it is.
+            let [x, y, _] = motors;
+            return self.mesh().map_or(wanted, |mesh| mesh.machine_from_gcode([x, y, wanted])[2]);
+        }
+        // X and Y depend on the bed's height, and that on them, by a share of a share.
+        for _ in 0..MOTORS_PLACE_ROUNDS {
+            motors[axis] += wanted - self.gcode_from_machine(motors)[axis];
+        }
+        motors[axis]
+    }
+
+    /// Tells who reads G-code that these axes have been homed, and that the motors stand there: X and Y are where the
+    /// skew has them for it, all those that lean with what was homed. Z counts as the endstop says, with a mesh too: the
+    /// next move makes up for it.
+    pub fn set_homed(&self, interpreter: &mut Interpreter, axes: [bool; 3], motors: [f64; 3]) {
+        let [x, y, z] = motors;
+        let z = if axes[2] { z } else { interpreter.position().z };
+        let at = self.skew.gcode_from_machine([x, y, z]);
+        if self.skew != Skew::default() {
+            interpreter.stand_at(at[0], at[1], at[2]);
+        }
+        let [x, y, z] = core::array::from_fn(|axis| axes[axis].then_some(at[axis]));
+        interpreter.set_axes(x, y, z);
+    }
+
+    /// The same where of the other axes nothing is known but what has been read.
+    pub fn home(&self, interpreter: &mut Interpreter, axes: [bool; 3], endstops: [f64; 3]) {
+        let gcode::Position { x, y, z, .. } = interpreter.position();
+        let before = self.machine_from_gcode([x, y, z]);
+        let motors = core::array::from_fn(|axis| if axes[axis] { endstops[axis] } else { before[axis] });
+        self.set_homed(interpreter, axes, motors);
     }
 
     /// The least and the most that is ever added to Z.

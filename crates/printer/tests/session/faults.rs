@@ -57,6 +57,17 @@ fn a_job_that_moves_filament_by_the_metre() {
 }
 
 #[test]
+fn filament_at_a_place_that_is_named_again_is_on_the_spot() {
+    let file = format!(
+        "{START}G20\nG1 X1.1 Y1.3 F200\nG92 X0.3 Y0.7\nG1 X0.3 Y0.7 E0.4\nG1 X0.7 Y0.3\nG1 X0.7 Y0.3 E0.4\n{END}"
+    );
+    let mut bench = Setup::default().ready();
+    bench.start_with(&file, JobOptions::default()).unwrap();
+    bench.job_over();
+    bench.job_done();
+}
+
+#[test]
 fn a_job_with_a_line_that_cannot_be_read() {
     let file = squares(2).replacen("G1 Y90 E1", "G1 Y9O E1", 1);
     let line = file.lines().position(|line| line.contains("9O")).unwrap() as u32 + 1;

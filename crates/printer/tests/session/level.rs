@@ -1,9 +1,11 @@
 //! Prints on a bed that is not flat, by axes that are not square: hosts that die, pauses, and prints that begin with a line.
 
 use printer::{
+    error::ErrorCode,
     journal::Journal,
     session::{Event, JobOptions, JobStatus, PhaseName, Request, ScheduledMove},
 };
+use units::Mm;
 use virtual_printer::BoardProfile;
 
 use crate::{
@@ -195,5 +197,66 @@ fn a_print_that_begins_with_a_line_goes_above_the_bed_that_it_has() {
         for way in ways.filter(|way| way.from[0] != way.to[0] || way.from[1] != way.to[1]) {
             assert!(way.from[2].min(way.to[2]) >= top + 1.9, "{line}: {way:?} {top}");
         }
+    }
+}
+
+#[test]
+fn what_is_said_of_an_axis_is_what_is_told_of_it() {
+    let mut bench = levelled(BoardProfile::rp2040()).ready();
+    bench.gcode("BED_MESH_PROFILE LOAD=cold\nG28\nG1 X70 Y80 Z10 F6000");
+    let set = |axis, mm| Request::SetPosition { axis, position: Mm(mm) };
+    let told = |bench: &Bench, axis: usize| bench.session.position().unwrap().0[axis];
+    // Above, in and below the fade; saying it again changes nothing.
+    for z in [10.0, 3.0, 0.3] {
+        for _ in 0..3 {
+            bench.ask(set(2, z));
+            assert!((told(&bench, 2) - z).abs() < 1e-9, "{z} {}", told(&bench, 2));
+        }
+    }
+    // At the bed's middle, which is deep, the motor stands lower than the head over the bed.
+    assert!((-0.2..-0.05).contains(&bench.session.z_lift()), "{}", bench.session.z_lift());
+    // Where the motor would be below its end.
+    assert_eq!(bench.request(set(2, 0.0)).unwrap_err().code, ErrorCode::MoveOutOfRange);
+    bench.gcode("SKEW_PROFILE LOAD=lean");
+    for (axis, mm) in [(1, 60.0), (0, 40.0), (2, 5.0)] {
+        bench.ask(set(axis, mm));
+        assert!((told(&bench, axis) - mm).abs() < 1e-9, "{axis} {mm} {}", told(&bench, axis));
+    }
+    // Of axes that lean none is known without the others.
+    bench.gcode("M84");
+    assert_eq!(bench.request(set(0, 40.0)).unwrap_err().code, ErrorCode::NotHomed);
+}
+
+#[test]
+fn an_axis_that_is_homed_in_a_print_leaves_the_others_where_the_skew_has_them() {
+    let setup = levelled(BoardProfile::rp2040());
+    let file = leaning(&file()).replacen("M400\n", "G28 Y\nG1 Z2 F600\nM400\n", 1);
+    let homing = 1 + file.lines().position(|line| line == "G28 Y").unwrap() as u32;
+    let begun = || {
+        let (mut bench, _) = started(&setup, &file);
+        let homed = |event: &&Event| matches!(event, Event::Homed { axis: 1, .. });
+        bench.until("homed again", 100.0, |bench| bench.events.iter().filter(homed).count() > 1);
+        let from = bench.pulses().len();
+        (bench, from)
+    };
+    let (mut whole, from) = begun();
+    whole.job_over();
+    whole.job_done();
+    let expected = steps(&mut whole, from);
+    // What goes up takes X and Y along by what it leans, and by no more.
+    let made = moves(&whole);
+    let up: Vec<_> = made.iter().filter(|mv| mv.line == homing + 1).collect();
+    assert!(!up.is_empty());
+    let by = |mv: &ScheduledMove, axis: usize| (mv.to[axis] - mv.from[axis]).abs();
+    assert!(up.iter().all(|mv| by(mv, 0) < 0.02 && by(mv, 1) < 0.005), "{up:?}");
+    for late in [0.3, 1.5] {
+        let (mut bench, from) = begun();
+        bench.run(late);
+        die(&mut bench, &setup, 0.2);
+        take_up(&mut bench, &file);
+        bench.ask(Request::Resume);
+        bench.job_over();
+        bench.job_done();
+        assert!(steps(&mut bench, from) == expected, "{late}");
     }
 }

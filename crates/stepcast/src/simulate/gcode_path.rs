@@ -70,6 +70,8 @@ pub(crate) struct GcodePath<R> {
     bent: Option<BentMove>,
     /// A line has changed where places are, and the head has not moved since.
     is_moved_over: bool,
+    /// Where the motors stand, as far as that is known.
+    head: Option<[f64; AXES]>,
     /// Lines before this one are read, not made; where axes are once they are homed there.
     begins: (u32, [f64; AXES]),
     /// The machine homes all axes together.
@@ -96,6 +98,7 @@ impl<R: MoreGcode> GcodePath<R> {
             profiles,
             bent: None,
             is_moved_over: false,
+            head: Some([0.0; AXES]),
             begins: (0, [0.0; AXES]),
             homes_together: false,
             fed_all: false,
@@ -107,6 +110,7 @@ impl<R: MoreGcode> GcodePath<R> {
     /// The print begins with this line; those before are read as if axes had been homed to these positions.
     pub(crate) fn begin_with(&mut self, line: u32, endstops: [f64; AXES]) {
         self.begins = (line, endstops);
+        self.head = None;
     }
 
     /// The axes that the machine homes where the file wants these to be.
@@ -124,6 +128,12 @@ impl<R: MoreGcode> GcodePath<R> {
 
     /// Takes the file's next move, which must be this one.
     pub(crate) fn take(&mut self, line: u32, from: [f64; 4], to: [f64; 4]) -> anyhow::Result<Piece> {
+        let taken = self.take_next(line, from, to)?;
+        self.head = Some([to[0], to[1], to[2]]);
+        Ok(taken)
+    }
+
+    fn take_next(&mut self, line: u32, from: [f64; 4], to: [f64; 4]) -> anyhow::Result<Piece> {
         loop {
             if let Some(bent) = &mut self.bent {
                 let taken = bent.take(&self.transform, line, from, to);
@@ -133,20 +143,20 @@ impl<R: MoreGcode> GcodePath<R> {
             let Some(mut piece) = self.next()? else {
                 anyhow::bail!("the printer makes a move for line {line}, but the file has no more moves");
             };
-            if self.transform.is_identity() {
-                if self.is_moved_over && piece.has_length() {
-                    // It leads there from where the head stood.
+            let is_level = self.transform.is_identity();
+            if piece.from[..AXES] == piece.to[..AXES] {
+                if self.is_moved_over || !is_level {
+                    // Filament alone leaves the head where it is.
                     piece.from[..AXES].copy_from_slice(&from[..AXES]);
-                    self.is_moved_over = false;
+                    piece.to[..AXES].copy_from_slice(&from[..AXES]);
                 }
-            } else {
-                if piece.from[..AXES] != piece.to[..AXES] {
-                    self.bent = Some(BentMove::new(piece, &self.transform, from));
-                    continue;
-                }
-                // Filament alone leaves the head where it is.
+            } else if !is_level {
+                self.bent = Some(BentMove::new(piece, &self.transform, from));
+                continue;
+            } else if self.is_moved_over && piece.has_length() {
+                // It leads there from where the head stood.
                 piece.from[..AXES].copy_from_slice(&from[..AXES]);
-                piece.to[..AXES].copy_from_slice(&from[..AXES]);
+                self.is_moved_over = false;
             }
             let filament = (piece.to[AXES] - piece.from[AXES]) - (to[AXES] - from[AXES]);
             let same = piece.line == line
@@ -215,8 +225,7 @@ impl<R: MoreGcode> GcodePath<R> {
     fn pass(&mut self, action: &Action) {
         if let Action::Home { x, y, z } = *action {
             let axes = self.homed_by([x, y, z]);
-            let [x, y, z] = [0, 1, 2].map(|axis: usize| axes[axis].then_some(self.begins.1[axis]));
-            self.interpreter.set_axes(x, y, z);
+            self.transform.home(&mut self.interpreter, axes, self.begins.1);
         }
         if matches!(action, Action::Skew(_) | Action::BedMesh(_)) {
             self.set_transform(action);
@@ -257,15 +266,18 @@ impl<R: MoreGcode> GcodePath<R> {
 
     fn home(&mut self, axes: [bool; AXES]) -> anyhow::Result<()> {
         let axes = self.homed_by(axes);
-        let mut at = [None; AXES];
+        let gcode::Position { x, y, z, .. } = self.interpreter.position();
+        let mut motors = self.head.unwrap_or_else(|| self.transform.machine_from_gcode([x, y, z]));
         for axis in (0..AXES).filter(|&axis| axes[axis]) {
             let Some(found) = self.homed.iter().position(|&(homed, _)| homed == axis) else {
                 anyhow::bail!("the file homes axis {}, but the printer did not", ["X", "Y", "Z"][axis]);
             };
-            at[axis] = self.homed.remove(found).map(|(_, position_mm)| position_mm);
+            if let Some((_, position_mm)) = self.homed.remove(found) {
+                motors[axis] = position_mm;
+            }
         }
-        let [x, y, z] = at;
-        self.interpreter.set_axes(x, y, z);
+        self.head = Some(motors);
+        self.transform.set_homed(&mut self.interpreter, axes, motors);
         Ok(())
     }
 }
@@ -356,5 +368,36 @@ mod tests {
             count += 1;
         }
         assert!(count > 30);
+    }
+
+    #[test]
+    fn filament_alone_is_where_the_head_stands_after_a_skew_was_cleared() {
+        let mut path =
+            path("SET_SKEW XY=140.4,142.8,99.8\nG1 X50 Y50 F600\nSET_SKEW CLEAR=1\nG1 E1\nG1 X50.5\n");
+        let mut skewed = Transform::default();
+        let lengths = Some([140.4, 142.8, 99.8]);
+        let change = gcode::SkewChange::Measured { xy: lengths, xz: None, yz: None };
+        skewed.set(&Action::Skew(change), &Profiles::default()).unwrap();
+        let [x, y, z] = skewed.machine_from_gcode([50.0, 50.0, 0.0]);
+        assert!((x - 50.0).abs() > 0.1);
+        path.take(2, [0.0; 4], [x, y, z, 0.0]).unwrap();
+        path.take(4, [x, y, z, 0.0], [x, y, z, 1.0]).unwrap();
+        path.take(5, [x, y, z, 1.0], [50.5, 50.0, 0.0, 1.0]).unwrap();
+        path.finish().unwrap();
+    }
+
+    #[test]
+    fn an_axis_that_leans_is_elsewhere_once_another_is_homed() {
+        let mut path = path("SET_SKEW XY=140.4,142.8,99.8\nG1 X50 Y50 F600\nG28 Y\nG1 Z5\n");
+        let lengths = Some([140.4, 142.8, 99.8]);
+        let change = gcode::SkewChange::Measured { xy: lengths, xz: None, yz: None };
+        let mut skewed = Transform::default();
+        skewed.set(&Action::Skew(change), &Profiles::default()).unwrap();
+        let [x, y, z] = skewed.machine_from_gcode([50.0, 50.0, 0.0]);
+        path.take(2, [0.0; 4], [x, y, z, 0.0]).unwrap();
+        path.homed(1, 200.0);
+        // Of X the motors stay where they were.
+        path.take(4, [x, 200.0, z, 0.0], [x, 200.0, 5.0, 0.0]).unwrap();
+        path.finish().unwrap();
     }
 }

@@ -6,14 +6,32 @@ use steps::Geometry;
 use units::{Seconds, Ticks};
 use wire::Command;
 
+use super::{EXPIRE, REASON_ENDSTOP, REASON_EXPIRED, REASON_HOST, REPORT, SAMPLE, SAMPLES};
 use crate::{
     config::{Kinematics, PrinterConfig},
-    machine::{self, MOTORS},
+    machine::{self, MOTORS, Motors},
+    planner::Position,
     session::{board::Board, layout::EndstopOids},
 };
 
-/// Less than this is rounding, no motion.
-const DRIFT_MIN_MM: f64 = 1e-9;
+/// Less than this is rounding, in mm …
+const DUST_MM: f64 = 1e-9;
+/// … and in steps.
+const DUST_STEPS: f64 = 1e-6;
+/// What it counts that the axis itself is moved off its home by a step, beside an axis that is to be where it was: it has
+/// just been found anew, to half a step.
+const OWN_SHARE: f64 = 1e-3;
+
+/// How the machine stands before an axis is homed.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::session) struct Standing {
+    /// Where the planner has it …
+    pub(in crate::session) position: Position,
+    /// … which means something for these axes …
+    pub(in crate::session) homed: [bool; 3],
+    /// … and how far they are from there, in mm: what homing others could not put right with whole steps.
+    pub(in crate::session) off_mm: [f64; 3],
+}
 
 /// A straight move that homing wants made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,9 +55,9 @@ pub(in crate::session) enum Wish {
     Abandon,
     /// The board stopped the motor because it had heard nothing; it now goes on. The user should know of it.
     GoesOn,
-    /// The motors of other axes have not stopped at the very same step, which has moved those axes by so much, in mm: have
-    /// them moved back, as [`Self::Move`], or call `AxisHoming::is_straight`.
-    Straighten([f64; 3]),
+    /// The motors have not stopped where other axes are where they were: have each make so many steps more, as
+    /// [`Self::Move`].
+    Straighten([i32; MOTORS]),
     /// The axis is home.
     Done,
     /// The axis stands still because it was told to; where, nobody knows.
@@ -67,8 +85,8 @@ pub(super) enum Stage {
     Retract,
     /// Ask whether the endstop has been let go.
     Released,
-    /// Have other axes moved back.
-    PlanStraight([f64; 3]),
+    /// Have other axes moved back, by so many steps of the motors.
+    PlanStraight([i32; MOTORS]),
     /// On that way.
     Straight,
     Done,
@@ -87,6 +105,40 @@ pub(super) struct Stop {
 }
 
 impl Stop {
+    /// Its motors stop when it closes.
+    pub(super) fn arm(&self, index: usize, movers: &[Mover], start: Ticks, rest: Seconds, board: &mut Board) {
+        let oids = self.oids;
+        let (trsync, clock) = (oids.trsync.0, start.low().0);
+        board.control(&Command::TrsyncStart {
+            oid: trsync,
+            report_clock: clock,
+            report_ticks: board.ticks(REPORT).0 as u32,
+            expire_reason: REASON_EXPIRED,
+        });
+        for mover in movers.iter().filter(|mover| mover.stop == index) {
+            board.control(&Command::StepperStopOnTrigger { oid: mover.oid, trsync_oid: trsync });
+        }
+        board.control(&Command::TrsyncSetTimeout {
+            oid: trsync,
+            clock: (start + board.ticks(EXPIRE)).low().0,
+        });
+        board.control(&Command::EndstopHome {
+            oid: oids.endstop.0,
+            clock,
+            sample_ticks: board.ticks(SAMPLE).0 as u32,
+            sample_count: SAMPLES,
+            rest_ticks: board.ticks(rest).0 as u32,
+            pin_value: u8::from(!oids.inverted),
+            trsync_oid: trsync,
+            trigger_reason: REASON_ENDSTOP,
+        });
+    }
+
+    /// Its motors stop now. One that has stopped says why it has.
+    pub(super) fn trigger(&self, board: &mut Board) {
+        board.control(&Command::TrsyncTrigger { oid: self.oids.trsync.0, reason: REASON_HOST });
+    }
+
     /// It watches nothing any more.
     pub(super) fn disarm(&self, board: &mut Board) {
         board.control(&Command::EndstopHome {
@@ -160,24 +212,61 @@ pub(super) fn parts(axis: usize, config: &PrinterConfig, board: &Board) -> Optio
     Some((vec![stop(axis)], movers?))
 }
 
-/// By how much all of that has moved axes that are not homed, in mm.
-pub(super) fn drift(axis: usize, movers: &[Mover], geometry: &Geometry) -> [f64; 3] {
-    let mut gone = [0.0; MOTORS];
+/// The steps that motors have yet to make so that the axes that were homed before are where the planner has them, and how
+/// far they are from that afterwards, in mm.
+///
+/// What counts is the difference between the steps that a motor has made and those from the planner's step before to its
+/// step with the axis at home. So whatever rounding there is at either place, it is never added up.
+pub(super) fn missing(
+    axis: usize,
+    home_mm: f64,
+    movers: &[Mover],
+    motors: &Motors,
+    standing: &Standing,
+) -> ([i32; MOTORS], [f64; 3]) {
+    let Geometry::Linear(linear) = motors.geometry() else {
+        // An axis with a motor of its own moves nothing else; towers are all homed.
+        return ([0; MOTORS], [0.0; 3]);
+    };
+    let mut home = standing.position;
+    home[axis] = home_mm;
+    let (before, after) = (motors.counts(&standing.position), motors.counts(&home));
+    let mut over = [0.0; MOTORS];
+    let mut steps_mm = [0.0; MOTORS];
     for mover in movers {
         let steps = mover.first.map_or(0, |first| mover.position.wrapping_sub(first));
         let steps = if mover.invert_dir { steps.wrapping_neg() } else { steps };
-        gone[mover.motor] = f64::from(steps) * mover.step_mm;
+        over[mover.motor] = f64::from(steps) - (after[mover.motor] - before[mover.motor]);
+        steps_mm[mover.motor] = mover.step_mm;
     }
-    match geometry {
-        Geometry::Linear(linear) => {
-            let [x, y, z, _] = linear.position(&gone);
-            let mut drift = [x, y, z].map(|by| if by.abs() > DRIFT_MIN_MM { by } else { 0.0 });
-            drift[axis] = 0.0;
-            drift
+    let off = |made: &[f64; MOTORS]| {
+        let at =
+            linear.position(&core::array::from_fn(|motor| (over[motor] + made[motor]) * steps_mm[motor]));
+        let off: [f64; 3] = core::array::from_fn(|other| standing.off_mm[other] + at[other]);
+        let matters = |other: usize| other != axis && standing.homed[other];
+        let others: [f64; 3] = core::array::from_fn(|other| if matters(other) { off[other] } else { 0.0 });
+        (others, at[axis].abs())
+    };
+    // The way back of the other axes alone, in steps; each motor makes the whole ones on either side of that.
+    let [x, y, z] = off(&[0.0; MOTORS]).0.map(|by| -by);
+    let back = motors.geometry().motor_positions(&[x, y, z, 0.0]);
+    let mut best = ([0.0; MOTORS], f64::INFINITY);
+    for choice in 0..1_u32 << movers.len().min(MOTORS) {
+        let mut made = [0.0; MOTORS];
+        for (bit, mover) in movers.iter().enumerate() {
+            let wanted = back[mover.motor] / mover.step_mm;
+            let is_up = choice >> bit & 1 == 1;
+            made[mover.motor] =
+                if is_up { libm::ceil(wanted - DUST_STEPS) } else { libm::floor(wanted + DUST_STEPS) };
         }
-        // An axis with a motor of its own moves nothing else; towers are all homed.
-        Geometry::Cartesian | Geometry::Delta(_) => [0.0; 3],
+        let (others, own) = off(&made);
+        let cost = others.iter().map(|by| by.abs()).sum::<f64>() + OWN_SHARE * own;
+        if cost < best.1 {
+            best = (made, cost);
+        }
     }
+    let left = off(&best.0).0.map(|by| if by.abs() > DUST_MM { by } else { 0.0 });
+    (best.0.map(|steps| steps as i32), left)
 }
 
 /// How far its carriage is taken to be from its endstop at most, for an axis of this length, in mm.

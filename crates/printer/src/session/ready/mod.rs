@@ -84,6 +84,8 @@ pub(super) struct Ready {
     held: Held,
     pub(super) events: Events,
     pub(super) diary: Diary,
+    /// How far axes are from where the planner has them, in mm: what homing another could not put right in whole steps.
+    pub(super) off_mm: [f64; 3],
     pub(super) last_active: Seconds,
     /// When the last run of motion came to its end, by this host's clock.
     rested: Seconds,
@@ -121,6 +123,7 @@ impl Ready {
             held: Held::default(),
             events: Events::default(),
             diary: Diary::default(),
+            off_mm: [0.0; 3],
             last_active: now,
             rested: Seconds(f64::NEG_INFINITY),
             lease,

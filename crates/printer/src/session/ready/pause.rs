@@ -29,6 +29,14 @@ fn impossible() -> Failure {
     Failure::Stop(PrinterError::new(ErrorCode::Internal, detail))
 }
 
+/// Where the head is parked. An axis that is not homed stays where it is, as does one that has no place to go to.
+fn park_place(at: [f64; 2], homed: [bool; 3], places: [Option<Mm>; 2], reach: &Reach) -> [f64; 2] {
+    let places: [Option<f64>; 2] =
+        core::array::from_fn(|axis| places[axis].filter(|_| homed[axis]).map(|place| place.0));
+    let within = reach.clamped(core::array::from_fn(|axis| places[axis].unwrap_or(at[axis])));
+    core::array::from_fn(|axis| places[axis].map_or(at[axis], |_| within[axis]))
+}
+
 impl Ready {
     /// The board has dropped the run that was being made, and its motors stand where they say: the job is put aside, and
     /// another planner moves the machine until it goes on.
@@ -121,12 +129,7 @@ impl Ready {
             let reach = Reach::new(&self.config);
             to[2] = reach.lifted([x, y, z], self.config.printer.pause_lift.0);
             self.planner.push_raw_move(to, RETURN_FEED, gcode::LineNumber(0))?;
-            for (axis, park) in self.config.printer.pause_position.into_iter().enumerate() {
-                if let Some(park) = park.filter(|_| homed[axis]) {
-                    to[axis] = park.0;
-                }
-            }
-            let [park_x, park_y] = reach.clamped([to[0], to[1]]);
+            let [park_x, park_y] = park_place([x, y], homed, self.config.printer.pause_position, &reach);
             let up = to[2];
             // So high up it may be too far away.
             let parks = reach.judge_way([x, y, up], [park_x, park_y, up]).is_ok();
@@ -183,6 +186,31 @@ impl Ready {
         self.events.push(Event::RunResumed { broken, at });
         for mv in moves {
             self.events.push(Event::Move(mv));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parking_moves_no_axis_that_is_not_homed_or_has_no_place() {
+        let config =
+            crate::config::parse(include_str!("../../../../../samples/printer.cfg")).0.expect("a machine");
+        let reach = Reach::new(&config);
+        // Where an axis that is not homed is taken to be may well be out of its reach.
+        let at = [-7.0, 1e4];
+        let places = [Some(Mm(3.0)), Some(Mm(-1e4))];
+        let [_, lowest] = reach.clamped([0.0, -1e4]);
+        for (homed, places, expected) in [
+            ([false, false, true], places, at),
+            ([true, false, true], places, [3.0, at[1]]),
+            ([false, true, true], places, [at[0], lowest]),
+            ([true; 3], [None; 2], at),
+            ([true; 3], [None, places[1]], [at[0], lowest]),
+        ] {
+            assert_eq!(park_place(at, homed, places, &reach), expected, "{homed:?}");
         }
     }
 }

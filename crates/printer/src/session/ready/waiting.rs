@@ -9,11 +9,11 @@ use super::{Failure, Ready};
 use crate::{
     error::{ErrorCode, PrinterError},
     journal::MovedBy,
-    machine::{self, MOTORS},
+    machine::{self, EXTRUDER, MOTORS, Motors},
     planner::{Barrier, ExtrusionPermit},
     session::{
         event::Event,
-        homing::{AxisHoming, Wish},
+        homing::{AxisHoming, Standing, Wish},
     },
 };
 
@@ -191,9 +191,9 @@ impl Ready {
                     self.planner.set_axis(axis, home_mm[axis], false);
                 }
             }
-            Ok(Wish::Straighten(by)) => {
+            Ok(Wish::Straighten(missing)) => {
                 if at_rest {
-                    self.straighten(by, now);
+                    self.straighten(missing, now);
                 }
             }
             Ok(Wish::GoesOn) => {
@@ -202,9 +202,11 @@ impl Ready {
             }
             Ok(Wish::Done) => {
                 let (axes, home_mm, steps) = (homing.axes, homing.home_mm, homing.steps());
+                self.off_mm = homing.off_mm();
                 for at in (0..3).filter(|&at| axes[at]) {
                     let position_mm = home_mm[at];
                     self.planner.set_axis(at, position_mm, true);
+                    self.off_mm[at] = 0.0;
                     // Of towers each tells of its own.
                     let own = |motor: usize| if axes == [true; 3] && motor != at { 0 } else { steps[motor] };
                     let steps = core::array::from_fn(own);
@@ -223,23 +225,27 @@ impl Ready {
         }
     }
 
-    /// Homing has moved axes by so much that are where they are: they go back.
-    fn straighten(&mut self, by: [f64; 3], now: Seconds) {
-        let Wait::Homing { axis: homing, .. } = &mut self.wait else { return };
-        let homed = self.planner.guard.homed();
+    /// Homing has left motors so many steps short of where other axes are where they were: they make them.
+    fn straighten(&mut self, missing: [i32; MOTORS], now: Seconds) {
         let to = self.planner.position();
-        let mut from = to;
-        for axis in (0..3).filter(|&axis| homed[axis]) {
-            from[axis] += by[axis];
-        }
-        if from == to {
-            return homing.is_straight();
-        }
+        let short = missing.map(i32::saturating_neg);
+        let Some(mut from) = Motors::new(&self.config).moved(&to, short) else {
+            let detail = "the motors' counts belong to no place of the head";
+            return self.homing_failed(PrinterError::new(ErrorCode::Internal, detail), now);
+        };
+        from[EXTRUDER] = to[EXTRUDER];
         self.planner.stand_at(from);
         match self.planner.push_raw_move(to, STRAIGHTEN_SPEED, LineNumber(0)) {
             Ok(()) => drop(self.planner.finish_run()),
             Err(error) => self.homing_failed(error, now),
         }
+    }
+
+    /// An axis, about to be homed.
+    fn homing(&self, axis: usize) -> Option<AxisHoming> {
+        let (position, homed) = (self.planner.position(), self.planner.guard.homed());
+        let standing = Standing { position, homed, off_mm: self.off_mm };
+        AxisHoming::new(axis, &self.config, &self.board, standing)
     }
 
     /// The motors have been stopped by something else: what was planned for them is forgotten.
@@ -256,17 +262,15 @@ impl Ready {
         let (mut remaining, axes, line) = (core::mem::take(remaining), *axes, *line);
         self.wait = Wait::Nothing;
         while let Some(axis) = remaining.pop_front() {
-            if let Some(homing) = AxisHoming::new(axis, &self.config, &self.board) {
+            if let Some(homing) = self.homing(axis) {
                 self.wait = Wait::Homing { axis: Box::new(homing), remaining, axes, line };
                 return;
             }
         }
-        let position = self.planner.position();
-        let [x, y, z] = core::array::from_fn(|axis| axes[axis].then_some(position[axis]));
         // A job that is paused, or on its way to its first line, has nothing to do with it.
         let plans_job = self.plans_job();
         let source = self.job.as_mut().filter(|_| plans_job).map(|job| &mut job.source);
-        source.unwrap_or(&mut self.console.source).interpreter.set_axes(x, y, z);
+        self.planner.tell_homed(axes, source.unwrap_or(&mut self.console.source));
     }
 
     /// Has axes homed, one after the other, or all together.
@@ -277,7 +281,7 @@ impl Ready {
             remaining.truncate(1);
         }
         if let Some(axis) = remaining.pop_front()
-            && let Some(homing) = AxisHoming::new(axis, &self.config, &self.board)
+            && let Some(homing) = self.homing(axis)
         {
             self.wait = Wait::Homing { axis: Box::new(homing), remaining, axes, line };
         }
@@ -290,6 +294,7 @@ impl Ready {
 
     pub(super) fn homing_failed(&mut self, mut error: PrinterError, now: Seconds) {
         if let Wait::Homing { axis, line, .. } = &self.wait {
+            axis.stop_all(&mut self.board);
             let axis = axis.axis;
             error = error.at_line(line.0);
             self.break_run(now);
