@@ -20,7 +20,7 @@ import {
   type Vec3,
   zoom,
 } from './camera';
-import type { ColourMode, ValueRange } from './colours';
+import { type ColourMode, PLANNED_MODES, type ValueRange } from './colours';
 import { Content } from './content';
 import { Drawing, EMPTY_BOX, type Model } from './drawing';
 import { FrameLoop, realmClock } from './frames';
@@ -49,6 +49,14 @@ const GROWTH_FRAME_MS: Ms = 200;
 const SMOOTH_MAX_MS: Ms = 1500;
 /** Found ranges are told at most this often. */
 const RANGES_MS: Ms = 250;
+
+const isPlanned = (mode: ColourMode): boolean => PLANNED_MODES.includes(mode);
+
+/** Whether a layer begins where the one in the same place of another list does. */
+const isAt =
+  (others: readonly Layer[]) =>
+  ({ firstVertex }: Layer, at: number): boolean =>
+    others[at]?.firstVertex === firstVertex;
 
 export class ToolpathView {
   readonly #canvas: HTMLCanvasElement | OffscreenCanvas;
@@ -108,41 +116,37 @@ export class ToolpathView {
     this.#loop.moved();
   }
 
-  /** A new file: what was there goes. */
+  /** A new file: what was there goes. What is shown of it stays as it was said, for that may come before. */
   begin(header: VertexHeader): void {
     this.#empty();
     this.#model.content = new Content(header);
     this.#model.printed = ALL_PRINTED;
-    const { layerFrom, layerTo, vertexFrom, vertexTo, hiddenObjects } = SHOW_ALL;
-    this.#model.shown = {
-      ...this.#model.shown,
-      layerFrom,
-      layerTo,
-      vertexFrom,
-      vertexTo,
-      hiddenObjects,
-    };
-    this.#grown = performance.now();
+    // The first vertices are shown at once.
+    this.#grown = -Infinity;
     this.#loop.moved();
   }
 
   /** The next vertices of the file, four words each; the array is copied. */
   append(vertices: Uint32Array): void {
     this.#model.content?.append(vertices);
+    this.#tellRanges();
     this.#hasGrown();
   }
 
   /** Planner channels of the next vertices that have none yet, four words each; the array is copied. */
   appendChannels(words: Uint32Array): void {
     this.#model.content?.appendChannels(words);
-    this.#hasGrown();
+    this.#tellRanges();
+    if (isPlanned(this.#model.mode)) this.#hasGrown();
   }
 
   /** The file has no more vertices. */
   end(): void {
-    this.#model.content?.end();
+    const { content } = this.#model;
+    content?.end();
     this.#tellRanges();
     this.#loop.moved();
+    if (content) this.#tell({ type: 'built', vertices: content.store.count });
   }
 
   /** No file any more. */
@@ -152,11 +156,13 @@ export class ToolpathView {
   }
 
   setLayers(layers: readonly Layer[]): void {
+    const same = layers.length === this.#layers.length && layers.every(isAt(this.#layers));
     this.#layers = layers;
     this.#model.content?.setLayers(layers);
     this.#drawing.layerTimes.set(layers);
     this.#tellRanges();
-    this.#loop.moved();
+    // Times alone change no picture but that of times.
+    if (!same || this.#model.mode === 'layerTime') this.#loop.moved();
   }
 
   show(shown: Partial<Shown>): void {
@@ -335,11 +341,10 @@ export class ToolpathView {
 
   #hasGrown(): void {
     if (!this.#model.content) return;
-    this.#tellRanges();
     const now = performance.now();
     if (now - this.#grown < GROWTH_FRAME_MS) return;
     this.#grown = now;
-    this.#loop.moved();
+    this.#loop.grew();
   }
 
   /** Soon, and not oftener than it helps. */
@@ -350,7 +355,9 @@ export class ToolpathView {
       if (!content) return;
       this.#tell({ type: 'ranges', ranges: content.ranges, isWhole: content.isWhole });
       // What has come since the last picture may be in colour.
-      if (mode !== 'feature') this.#loop.moved();
+      if (!isPlanned(mode)) return;
+      if (content.isWhole) this.#loop.moved();
+      else this.#loop.grew();
     }, RANGES_MS);
   }
 

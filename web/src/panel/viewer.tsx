@@ -1,6 +1,6 @@
 // The preview: the 3D view with what belongs to it, the file's text, and the place where files are dropped.
 import type { JSX } from 'preact';
-import { file, reading, summary } from '../state/preview';
+import { file, outline, reading } from '../state/preview';
 import { settings } from '../state/settings';
 import { Icon } from './icons';
 import { openSample, pickFile } from './open_file';
@@ -61,7 +61,7 @@ export function Viewer(): JSX.Element {
             {viewFailure.value && <NoView reason={viewFailure.value} />}
             {hasView && <ViewTools isFlat={isFlat.value} />}
           </div>
-          {summary.value && hasView && (
+          {outline.value && hasView && (
             <>
               <Legend isFlat={isFlat.value} />
               <SegmentCard />
@@ -69,13 +69,13 @@ export function Viewer(): JSX.Element {
             </>
           )}
         </div>
-        {summary.value && hasView && <LayerBar />}
+        {outline.value && hasView && <LayerBar />}
         {hasText && <GcodeText />}
       </div>
       {progress !== null && (
         <progress class="reading" aria-label="Reading the file" max={1} value={progress} />
       )}
-      {summary.value && hasView && <MoveBar />}
+      {outline.value && hasView && <MoveBar />}
     </section>
   );
 }

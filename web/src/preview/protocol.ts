@@ -144,7 +144,9 @@ export type FromPreview =
   /** One byte a vertex, in order: how many lines further than the one before it it comes from; 255 where a mark says. */
   | { readonly kind: 'line-steps'; readonly job: number; readonly steps: Uint8Array<ArrayBuffer> }
   | { readonly kind: 'thumbnails'; readonly job: number; readonly thumbnails: readonly Thumbnail[] }
-  | { readonly kind: 'progress'; readonly job: number; readonly bytes: number; readonly lines: number }
+  | { readonly kind: 'progress'; readonly job: number; readonly share: number; readonly lines: number }
+  /** The geometry is whole: the summary without times, and without what the machine cannot do. */
+  | { readonly kind: 'outline'; readonly job: number; readonly outline: Summary }
   | { readonly kind: 'summary'; readonly job: number; readonly summary: Summary }
   /** Fewer where the file ends before; none where it cannot be read. */
   | { readonly kind: 'lines'; readonly id: number; readonly texts: readonly string[] }

@@ -11,7 +11,7 @@ import {
   RAMP,
 } from '@stepcast/toolpath';
 import type { JSX } from 'preact';
-import { summary } from '../../state/preview';
+import { outline, summary } from '../../state/preview';
 import { change, type Settings, settings } from '../../state/settings';
 import {
   chosenObject,
@@ -36,7 +36,7 @@ const percent = (share: number): string =>
   share > 0 && share < 0.01 ? '< 1 %' : `${formatNumber(share * 100)} %`;
 
 function Features(): JSX.Element {
-  const plan = summary.value;
+  const plan = outline.value;
   const features = plan?.features.filter(({ time, filament }) => time > 0 || filament > 0) ?? [];
   const all = features.reduce((sum, { time }) => sum + time, 0);
   return (
@@ -85,7 +85,7 @@ function Features(): JSX.Element {
 
 /** The objects that the file names: each can be hidden, and one made to stand out. */
 export function Objects(): JSX.Element | null {
-  const objects = summary.value?.objects ?? [];
+  const objects = outline.value?.objects ?? [];
   if (objects.length === 0) return null;
   return (
     <ul class="objects" aria-label="Objects">
@@ -124,8 +124,10 @@ const GRADIENT = `linear-gradient(to right, ${RAMP.join(', ')})`;
 function missing(mode: ColourMode): string | null {
   const { found, isWhole } = ranges.value;
   if (PLANNED_MODES.includes(mode) || mode === 'layerTime') {
-    if (summary.value?.time === null) return 'Needs a machine that is in order.';
-    if (!isWhole && PLANNED_MODES.includes(mode)) return 'Computing …';
+    // The planner is still at work.
+    if (!summary.value || (!isWhole && PLANNED_MODES.includes(mode) && summary.value.time !== null))
+      return 'Computing …';
+    if (summary.value.time === null) return 'Needs a machine that is in order.';
   }
   return found[mode] ? null : 'The file does not say.';
 }
@@ -218,13 +220,13 @@ function Meaning({ mode }: { readonly mode: ColourMode }): JSX.Element | null {
   if (mode === 'feature') return <Features />;
   if (mode === 'tool') return <Tools />;
   if (mode === 'object') {
-    return summary.value?.objects.length ? null : <p class="hint">The file names no objects.</p>;
+    return outline.value?.objects.length ? null : <p class="hint">The file names no objects.</p>;
   }
   return <Scale mode={mode} />;
 }
 
 export function Legend({ isFlat }: { readonly isFlat: boolean }): JSX.Element | null {
-  const plan = summary.value;
+  const plan = outline.value;
   if (!plan) return null;
   const modes = isFlat ? CATEGORICAL_MODES : COLOUR_MODES;
   const mode = modes.includes(settings.value.colourBy) ? settings.value.colourBy : 'feature';

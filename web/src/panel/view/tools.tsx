@@ -2,7 +2,7 @@
 import type { CameraPreset } from '@stepcast/toolpath';
 import type { JSX } from 'preact';
 import { useState } from 'preact/hooks';
-import { file, summary } from '../../state/preview';
+import { file, outline } from '../../state/preview';
 import { change, settings } from '../../state/settings';
 import { pictureOf } from '../../state/view_answers';
 import { save } from '../parts';
@@ -110,7 +110,7 @@ export function ViewTools({ isFlat }: { readonly isFlat: boolean }): JSX.Element
           isOn={followNozzle}
           onSet={(isOn) => change({ followNozzle: isOn })}
         />
-        {summary.value && <Picture />}
+        {outline.value && <Picture />}
         {file.value && (
           <Toggle
             name="G-code"
