@@ -12,6 +12,7 @@ import {
   type CameraState,
   DEFAULT_CAMERA,
   fit,
+  isSameCamera,
   orbit,
   PRESETS,
   type Projection,
@@ -43,10 +44,10 @@ export interface ViewSizePx {
   readonly ratio: number;
 }
 
-/** While vertices arrive, the picture follows this often. */
-const GROWTH_FRAME_MS: Ms = 200;
-/** Where a full picture takes longer, the next ones do without several samples a pixel. */
-const SMOOTH_MAX_MS: Ms = 1500;
+/** While vertices arrive, the picture follows this often: first soon, then not so often that drawing delays the reading. */
+const GROWTH_FRAME_MS: Ms = 150;
+const GROWTH_FRAME_MAX_MS: Ms = 1000;
+const GROWTH_SLOWER = 1.5;
 /** Found ranges are told at most this often. */
 const RANGES_MS: Ms = 250;
 
@@ -83,6 +84,7 @@ export class ToolpathView {
   #nozzleMm: Vec3 | null = null;
   #follows = false;
   #grown: Ms = 0;
+  #growthMs: Ms = GROWTH_FRAME_MS;
   #rangesTimer: ReturnType<typeof setTimeout> | null = null;
 
   constructor(
@@ -97,8 +99,7 @@ export class ToolpathView {
     canvas.addEventListener('webglcontextlost', this.#onLost);
     canvas.addEventListener('webglcontextrestored', this.#onRestored);
     this.#loop = new FrameLoop(this.#drawing, realmClock(), (report) => {
-      // Once too slow, it stays so: the next picture of this size is no cheaper.
-      if (report.kind === 'full' && report.totalMs > SMOOTH_MAX_MS) this.#drawing.smooth = false;
+      if (report.kind === 'full') this.#drawing.measured(report.segments, report.totalMs);
       tell({ type: 'frame', report });
     });
     this.setTheme('light');
@@ -121,9 +122,9 @@ export class ToolpathView {
     this.#empty();
     this.#model.content = new Content(header);
     this.#model.printed = ALL_PRINTED;
-    // The first vertices are shown at once.
+    // The first vertices are shown at once; until then there is nothing to see.
     this.#grown = -Infinity;
-    this.#loop.moved();
+    this.#growthMs = GROWTH_FRAME_MS;
   }
 
   /** The next vertices of the file, four words each; the array is copied. */
@@ -151,8 +152,9 @@ export class ToolpathView {
 
   /** No file any more. */
   clear(): void {
+    const wasThere = this.#model.content !== null;
     this.#empty();
-    this.#loop.moved();
+    if (wasThere) this.#loop.moved();
   }
 
   setLayers(layers: readonly Layer[]): void {
@@ -283,7 +285,9 @@ export class ToolpathView {
   fit(direction?: Pick<CameraState, 'azimuth' | 'elevation'>): void {
     const { camera, content, bedBox } = this.#model;
     const box = content?.store.box() ?? bedBox ?? EMPTY_BOX;
-    this.#move(fit({ ...camera, ...direction }, box, this.#drawing.stage.size));
+    const fitted = fit({ ...camera, ...direction }, box, this.#drawing.stage.size);
+    // The empty bed is not drawn again when a file is about to come.
+    if (content || !isSameCamera(fitted, camera)) this.#move(fitted);
   }
 
   /** Looks at the whole part from there. */
@@ -296,7 +300,7 @@ export class ToolpathView {
   }
 
   resize({ width, height, ratio }: ViewSizePx): void {
-    this.#drawing.smooth = true;
+    this.#drawing.smooth.reset();
     this.#drawing.stage.resize(width, height, ratio);
     this.#loop.moved();
   }
@@ -342,8 +346,9 @@ export class ToolpathView {
   #hasGrown(): void {
     if (!this.#model.content) return;
     const now = performance.now();
-    if (now - this.#grown < GROWTH_FRAME_MS) return;
+    if (now - this.#grown < this.#growthMs) return;
     this.#grown = now;
+    this.#growthMs = Math.min(this.#growthMs * GROWTH_SLOWER, GROWTH_FRAME_MAX_MS);
     this.#loop.grew();
   }
 
