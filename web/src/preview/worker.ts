@@ -1,11 +1,12 @@
 // The preview worker: reads a file through the planner's preview and hands out geometry, findings and estimates. Also
 // checks printer.cfg texts. One file at a time: a new one ends the reading of the one before.
 import type { Layer, SourcedRequest, ViewRequest } from '@stepcast/toolpath';
-import { FileChunks, linesOf, type Packing, packingOf } from '../files';
+import { FileChunks, linesOf, packingOf } from '../files';
 import { fileUnreadable, plannerMissing } from '../machine/troubles';
 import { LineIndex } from './line_index';
 import { type FilePreview, loadReader, type Reader } from './planner';
 import type { FromPreview, Summary, ToPreview } from './protocol';
+import { Unpacked } from './unpacked';
 
 /** Progress is told this often at most, in ms. */
 const PROGRESS_MS = 50;
@@ -44,8 +45,9 @@ function draw(job: number, request: ViewRequest, transfer: Transferable[] = []):
 interface Opened {
   readonly job: number;
   readonly file: Blob;
-  readonly packing: Packing;
   readonly index: LineIndex;
+  /** Of a packed file, as far as it has been read; null where it is none. */
+  readonly unpacked: Unpacked | null;
 }
 let opened: Opened | undefined;
 
@@ -99,13 +101,15 @@ async function read(
   }
   const preview = openPreview(reader, config);
   const index = new LineIndex();
-  if (current === job) opened = { job, file, packing, index };
+  const unpacked = packing === 'gzip' ? new Unpacked() : null;
+  if (current === job) opened = { job, file, index, unpacked };
   try {
     let told = 0;
     draw(job, { type: 'begin', header: preview.header() });
     for (let chunk = first; chunk; chunk = await chunks.next()) {
       if (current !== job) return;
       index.add(chunk);
+      unpacked?.add(chunk);
       feed(preview, job, chunk);
       if (performance.now() - told > PROGRESS_MS) {
         told = performance.now();
@@ -119,6 +123,7 @@ async function read(
     draw(job, { type: 'end' });
     draw(job, { type: 'fit' });
     tell({ kind: 'summary', job, summary });
+    if (unpacked?.isGivenUp) tell({ kind: 'slow-text', job });
   } finally {
     preview.free();
     await chunks.cancel();
@@ -160,12 +165,13 @@ async function tellLines({ id, file, first, last }: ToPreview & { kind: 'lines' 
 /** The last question for the open file's text. */
 let textAsked = 0;
 
-/** Any line is found by reading a few tens of kilobytes, but in a packed file, which is read from its beginning. */
+/** Any line is found by reading a few tens of kilobytes, but in a packed file that is too large to be kept unpacked. */
 async function textOf(open: Opened, first: number, last: number, id: number): Promise<string[]> {
   const isWanted = (): boolean => textAsked === id && opened === open;
-  if (open.packing === 'gzip') return await linesOf(open.file, first, last, isWanted, 'gzip');
+  const plain = open.unpacked ? open.unpacked.text() : open.file;
+  if (!plain) return await linesOf(open.file, first, last, isWanted, 'gzip');
   const { line, offset } = open.index.before(first);
-  return await linesOf(open.file.slice(offset), first - line + 1, last - line + 1, isWanted, 'plain');
+  return await linesOf(plain.slice(offset), first - line + 1, last - line + 1, isWanted, 'plain');
 }
 
 async function tellText({ id, job, first, last }: ToPreview & { kind: 'text' }): Promise<void> {
