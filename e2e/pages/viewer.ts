@@ -92,11 +92,31 @@ export class Viewer {
     return { x: box.x + box.width / 2, y: box.y + box.height / 2 };
   }
 
+  /** Waits until the view shows all that it was asked for in full detail, and the browser shows that. */
+  async drawn(): Promise<void> {
+    await expect(this.view).toHaveAttribute('aria-busy', 'false', { timeout: 60_000 });
+    await this.page.evaluate(
+      () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))),
+    );
+  }
+
+  /** A few pixels of the picture, around a place of the page. */
+  async patch(x: number, y: number): Promise<Buffer> {
+    return await this.whileBare(async () => {
+      await this.settled();
+      return await this.page.screenshot({ clip: { x: x - 4, y: y - 4, width: 8, height: 8 } });
+    });
+  }
+
   /** What is drawn, once it does not change any more: the whole view with all that lies over it taken away. */
   async picture(): Promise<Buffer> {
+    return await this.whileBare(() => this.settled());
+  }
+
+  private async whileBare<T>(act: () => Promise<T>): Promise<T> {
     await this.bare(true);
     try {
-      return await this.settled();
+      return await act();
     } finally {
       await this.bare(false);
     }
@@ -116,19 +136,17 @@ export class Viewer {
 
   private async settled(): Promise<Buffer> {
     const take = (): Promise<Buffer> => this.view.screenshot({ animations: 'disabled', caret: 'hide' });
-    let before = await take();
+    let before: Buffer | null = null;
     for (let tries = 0; tries < TRIES_MAX; tries += 1) {
-      // The full picture comes after the quick one, some time after the last change.
-      await this.page.waitForTimeout(SETTLE_MS);
-      const isFull = (await this.view.getAttribute('aria-busy')) === 'false';
+      await this.drawn();
       const now = await take();
-      if (isFull && now.equals(before)) return now;
+      // A frame of the view's worker may reach the screen a little after the worker has said so.
+      if (before && now.equals(before)) return now;
       before = now;
     }
     throw new Error('the picture does not settle');
   }
 }
 
-const OVER_VIEW = '.over-left, .legend, .segment-card, .hover-note';
-const SETTLE_MS = 400;
-const TRIES_MAX = 50;
+const OVER_VIEW = '.over-left, .legend, .segment-card, .hover-note, .empty';
+const TRIES_MAX = 20;

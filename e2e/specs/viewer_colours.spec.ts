@@ -66,6 +66,53 @@ test('each mode has its colours, and those that are measured their limits', asyn
   expect((await viewer.picture()).equals(automatic)).toBe(true);
 });
 
+test('temperature, fan and tools have the colours of what the file sets', async ({
+  panel,
+  page,
+  makeFile,
+}) => {
+  test.setTimeout(120_000);
+  const viewer = new Viewer(page);
+  await panel.look(makeFile('two-tools.gcode', TWO_TOOLS));
+  await viewer.ready();
+  const limits = (): Promise<string[]> =>
+    Promise.all(
+      [/^Least/, /^Greatest/].map((name) => viewer.legend.getByRole('textbox', { name }).inputValue()),
+    );
+  const seen = [await viewer.picture()];
+  const expectNew = async (mode: string): Promise<void> => {
+    const picture = await viewer.picture();
+    for (const other of seen) expect(picture.equals(other), mode).toBe(false);
+    seen.push(picture);
+  };
+  await viewer.colourBy.selectOption('Nozzle temperature');
+  await expect.poll(limits).toEqual(['200', '230']);
+  await expectNew('temperature');
+  await viewer.colourBy.selectOption('Fan');
+  await expect.poll(limits).toEqual(['0', '100']);
+  await expectNew('fan');
+
+  // Those that lay filament, and no others.
+  await viewer.colourBy.selectOption('Tool');
+  const tools = viewer.legend.getByRole('list', { name: 'Tools' }).getByRole('listitem');
+  await expect(tools).toHaveText([/^T0\s*0\.02 m$/, /^T2\s*0\.01 m$/]);
+  await expectNew('tool');
+});
+
+test('the scale has the colours that the view has in its theme', async ({ panel, page }) => {
+  const viewer = new Viewer(page);
+  await panel.drop(sample('test-part-small.gcode'));
+  await viewer.ready();
+  await viewer.colourBy.selectOption('Line width');
+  const bar = viewer.legend.locator('.scale-bar');
+  const ramp = (): Promise<string> => bar.evaluate((one) => getComputedStyle(one).backgroundImage);
+  // The darkest of viridis, which a dark background would hide.
+  expect(await ramp()).toContain('rgb(68, 1, 84)');
+  await page.emulateMedia({ colorScheme: 'dark' });
+  await expect.poll(ramp).not.toContain('rgb(68, 1, 84)');
+  expect(await ramp()).toContain('rgb(253, 231, 37)');
+});
+
 test('the choice is kept for the next visit', async ({ panel, page }) => {
   const viewer = new Viewer(page);
   await panel.drop(sample('test-part-small.gcode'));
@@ -76,3 +123,27 @@ test('the choice is kept for the next visit', async ({ panel, page }) => {
   await viewer.ready();
   await expect(viewer.colourBy).toHaveValue('width');
 });
+
+/** Beads of two tools, hotter and with the fan on from the second on. */
+const TWO_TOOLS = `G28
+G90
+M82
+M104 S200
+M109 S200
+G92 E0
+;LAYER_CHANGE
+;Z:0.2
+;HEIGHT:0.2
+G1 Z0.2 F600
+;TYPE:External perimeter
+;WIDTH:0.45
+G1 X90 Y90 F6000
+G1 X110 Y90 E10 F1200
+M104 S230
+M106 S255
+G1 X110 Y110 E20
+T2
+G1 X90 Y110 E30
+M107
+M104 S0
+`;

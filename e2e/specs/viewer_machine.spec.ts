@@ -3,6 +3,8 @@ import { expect, test } from '../fixtures/files.ts';
 import { sample } from '../pages/panel.ts';
 import { Viewer } from '../pages/viewer.ts';
 
+/** The page asks so many times before it gives up. */
+const PICTURE_TRIES = 3;
 const PNG_BEGINNING = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
 
 test('the view is turned by buttons and keys, with and without perspective', async ({ panel, page }) => {
@@ -50,6 +52,67 @@ test('a picture of the view is kept as PNG', async ({ panel, page }) => {
   expect(bytes.subarray(0, 8).equals(PNG_BEGINNING)).toBe(true);
   expect(bytes.readUInt32BE(16)).toBe(1920);
   expect(bytes.length).toBeGreaterThan(20_000);
+});
+
+test('that no picture could be made is said, and tried again', async ({ panel, page }) => {
+  // The first tries come to nothing, as on a graphics card that gives up.
+  await page.addInitScript((failures) => {
+    let left = failures;
+    window.Worker = class extends Worker {
+      override postMessage(
+        message: unknown,
+        transfer: Transferable[] | StructuredSerializeOptions = [],
+      ): void {
+        const { type, id } = message as { readonly type?: string; readonly id?: number };
+        if (type !== 'picture' || left === 0) return super.postMessage(message, transfer as Transferable[]);
+        left -= 1;
+        this.dispatchEvent(new MessageEvent('message', { data: { type, id, blob: null } }));
+      }
+    };
+  }, PICTURE_TRIES);
+  await panel.open();
+  const viewer = new Viewer(page);
+  await panel.drop(sample('test-part-small.gcode'));
+  await viewer.ready();
+  await viewer.button('Save a picture').focus();
+  await page.keyboard.press('Enter');
+  const notices = page.getByRole('status', { name: 'Notices' });
+  await expect(notices).toContainText('The picture could not be made');
+  test.setTimeout(150_000);
+  const coming = page.waitForEvent('download', { timeout: 90_000 });
+  await notices.getByRole('button', { name: 'Try again' }).click();
+  expect((await coming).suggestedFilename()).toBe('test-part-small.png');
+  await expect(notices).not.toContainText('The picture could not be made');
+});
+
+test.describe('by touch', () => {
+  test.use({ hasTouch: true });
+  test('one finger turns the view, two come nearer, a tap chooses', async ({ panel, page }) => {
+    test.setTimeout(90_000);
+    const viewer = new Viewer(page);
+    await panel.drop(sample('test-part.gcode'));
+    await viewer.ready();
+    const session = await page.context().newCDPSession(page);
+    const touch = async (type: 'touchStart' | 'touchMove' | 'touchEnd', ...xs: number[]): Promise<void> => {
+      const touchPoints = xs.map((dx, id) => ({ x: x + dx, y, id }));
+      await session.send('Input.dispatchTouchEvent', { type, touchPoints });
+    };
+    const { x, y } = await viewer.middle();
+    const whole = await viewer.picture();
+    await touch('touchStart', 0);
+    await touch('touchMove', 40);
+    await touch('touchMove', 80);
+    await touch('touchEnd');
+    const turned = await viewer.picture();
+    expect(turned.equals(whole), 'turned').toBe(false);
+    await touch('touchStart', -40, 40);
+    await touch('touchMove', -60, 60);
+    await touch('touchMove', -80, 80);
+    await touch('touchEnd');
+    expect((await viewer.picture()).equals(turned), 'nearer').toBe(false);
+    await page.touchscreen.tap(x, y);
+    await expect(viewer.segment).toBeVisible();
+  });
 });
 
 test('what leaves the machine is told by its colour', async ({ panel, page, makeFile }) => {

@@ -265,6 +265,7 @@ impl Host {
             position_mm: position.map(|(position, _)| position),
             live_mm: self.live(now),
             z_lift_mm: self.session.z_lift(),
+            mesh: self.session.mesh().map(ToOwned::to_owned),
             homed: position.map_or([false; 3], |(_, homed)| homed),
             job: JobView {
                 status: self.session.job_status().into(),

@@ -19,6 +19,9 @@ const found = (blocking: readonly Remark[], dropped = 0): Summary => ({
   time: null,
   features: [],
   objects: [],
+  tools: [],
+  leftOut: 0,
+  clamped: 0,
   generator: null,
 });
 

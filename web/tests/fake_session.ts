@@ -12,6 +12,7 @@ const SNAPSHOT: SessionSnapshot = {
   ],
   position: null,
   zLift: mm(0),
+  mesh: null,
   homed: [false, false, false],
   job: 'none',
   start: null,

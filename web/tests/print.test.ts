@@ -25,6 +25,9 @@ const plan: Summary = {
   time: seconds(200),
   features: [],
   objects: [],
+  tools: [],
+  leftOut: 0,
+  clamped: 0,
   generator: null,
 };
 const file = { name: 'part.gcode', blob: new Blob() };

@@ -1,6 +1,9 @@
 //! What a machine file says.
 
-use printer::config::{ConfigDiagnostic, PrinterConfig, Severity};
+use printer::{
+    config::{ConfigDiagnostic, Kinematics, PrinterConfig, Severity},
+    transform::Mesh,
+};
 use serde::Serialize;
 
 use super::HeaterName;
@@ -48,6 +51,8 @@ pub struct MachineSummary {
     pub min_mm: [f64; 3],
     /// The highest X, Y, Z allowed.
     pub max_mm: [f64; 3],
+    /// How far the head reaches from the middle where the bed is round; `null` where it is not.
+    pub bed_radius_mm: Option<f64>,
     /// Where each axis finds its endstop.
     pub endstop_mm: [f64; 3],
     /// The fastest move.
@@ -66,10 +71,26 @@ pub struct MachineSummary {
     pub filament_mm: Option<f64>,
     /// Heaters.
     pub heaters: Vec<HeaterSummary>,
+    /// Bed meshes that a print may load.
+    pub meshes: Vec<MeshSummary>,
     /// Whether there is a part fan.
     pub has_fan: bool,
     /// Rate of a real serial line, bits per second.
     pub baud: u32,
+}
+
+/// A bed's shape that the machine file has, as a grid of heights.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
+pub struct MeshSummary {
+    /// What `BED_MESH_PROFILE LOAD=` calls it.
+    pub name: String,
+    /// X and Y of the first point.
+    pub min_mm: [f64; 2],
+    /// From point to point along X and along Y.
+    pub step_mm: [f64; 2],
+    /// Row by row, the lowest Y first.
+    pub heights_mm: Vec<Vec<f64>>,
 }
 
 /// A heater.
@@ -123,6 +144,10 @@ impl MachineSummary {
         Self {
             min_mm: config.steppers.each_ref().map(|axis| axis.position_min.0),
             max_mm: config.steppers.each_ref().map(|axis| axis.position_max.0),
+            bed_radius_mm: match &config.printer.kinematics {
+                Kinematics::Delta(delta) => Some(delta.print_radius.0),
+                _ => None,
+            },
             endstop_mm: config.steppers.each_ref().map(|axis| axis.position_endstop.0),
             max_velocity_mm_s: config.printer.max_velocity.0,
             max_z_velocity_mm_s: config.printer.max_z_velocity.0,
@@ -132,8 +157,21 @@ impl MachineSummary {
             nozzle_mm: extruder.map(|extruder| extruder.nozzle_diameter.0),
             filament_mm: extruder.map(|extruder| extruder.filament_diameter.0),
             heaters: nozzle.into_iter().chain(bed).collect(),
+            meshes: config.profiles.meshes.values().map(|mesh| MeshSummary::of(mesh)).collect(),
             has_fan: config.fan.is_some(),
             baud: config.mcu.baud,
+        }
+    }
+}
+
+impl MeshSummary {
+    fn of(mesh: &Mesh) -> Self {
+        let surface = mesh.surface();
+        Self {
+            name: mesh.name.clone(),
+            min_mm: surface.axes.map(|axis| axis.min),
+            step_mm: surface.axes.map(|axis| axis.pitch()),
+            heights_mm: surface.rows().map(<[f64]>::to_vec).collect(),
         }
     }
 }
@@ -160,5 +198,17 @@ mod tests {
         assert_eq!(report.machine, None);
         let error = |finding: &&ConfigFinding| finding.severity == ConfigSeverity::Error && finding.line == 3;
         assert!(report.findings.iter().any(|finding| error(&finding)), "{report:?}");
+    }
+
+    #[test]
+    fn bed_meshes_are_handed_out_as_they_are_measured() {
+        let mesh = "\n[bed_mesh cold]\npoints:\n  0.1, 0.2, 0.3\n  0.4, 0.5, 0.6\n  0.7, 0.8, 0.9\nx_count: 3\ny_count: 3\n\
+                    min_x: 20\nmax_x: 120\nmin_y: 30\nmax_y: 230\n";
+        let report = ConfigReport::of(&format!("{}{mesh}", demo_machine::USUAL_MACHINE));
+        let machine = report.machine.unwrap();
+        let [mesh] = &machine.meshes[..] else { panic!("{machine:?}") };
+        assert_eq!(mesh.name, "cold");
+        assert_eq!((mesh.min_mm, mesh.step_mm), ([20.0, 30.0], [50.0, 100.0]));
+        assert_eq!(mesh.heights_mm, [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]);
     }
 }

@@ -14,13 +14,13 @@ mod request;
 mod snapshot;
 mod virtual_state;
 
-pub use config::{ConfigFinding, ConfigReport, ConfigSeverity, HeaterSummary, MachineSummary};
+pub use config::{ConfigFinding, ConfigReport, ConfigSeverity, HeaterSummary, MachineSummary, MeshSummary};
 pub use error::ErrorMessage;
 pub use event::{HeaterName, PhaseLabel, UiEvent};
 pub use journal::{InterruptionView, JournalView};
 pub use preview::{
     Blocking, FeatureSummary, FileKindReport, Finding, FindingSeverity, LayerSummary, ObjectSummary,
-    PreviewSummary,
+    PreviewSummary, ToolSummary,
 };
 pub use request::{JobRequest, JogAxis, UiRequest};
 pub use snapshot::{BoardView, JobPhase, JobView, LinkView, Snapshot, StartView, TemperatureView};

@@ -104,6 +104,16 @@ pub struct ObjectSummary {
     pub filament_mm: f64,
 }
 
+/// What is printed by one tool.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
+pub struct ToolSummary {
+    /// Its number in the vertices.
+    pub tool: u8,
+    /// Filament laid.
+    pub filament_mm: f64,
+}
+
 /// What a file holds, and what is wrong with it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
@@ -130,12 +140,16 @@ pub struct PreviewSummary {
     pub vertices: u32,
     /// Places that lay outside the vertices' range and were moved to its edge.
     pub clamped: u64,
+    /// Vertices beyond what can be shown, which are left out.
+    pub left_out: u64,
     /// Layers; those beyond 65 536 are part of the last.
     pub layers: Vec<LayerSummary>,
     /// The kinds of extrusion that occur.
     pub features: Vec<FeatureSummary>,
     /// The objects that the file names, at most 254; the first has number 1 in the vertices.
     pub objects: Vec<ObjectSummary>,
+    /// The tools that lay filament.
+    pub tools: Vec<ToolSummary>,
     /// Print time of the whole, planned for the machine; `null` without one, or where the plan fails.
     pub print_time_s: Option<f64>,
     /// Of it, moving without extruding, and waiting where the file says so.
@@ -167,6 +181,8 @@ impl PreviewSummary {
             centre_mm: object.centre_mm,
             filament_mm: object.filament.0,
         });
+        let tools =
+            report.tools.iter().map(|tool| ToolSummary { tool: tool.tool, filament_mm: tool.filament.0 });
         Self {
             printable,
             errors: check.errors.iter().map(ErrorMessage::from).collect(),
@@ -183,9 +199,11 @@ impl PreviewSummary {
             bounds_mm: check.bounds_mm,
             vertices: report.vertices,
             clamped: report.clamped,
+            left_out: report.left_out,
             layers: layers.collect(),
             features: features.collect(),
             objects: objects.collect(),
+            tools: tools.collect(),
             print_time_s: report.print_time.map(|time| time.0),
             travel_time_s: report.travel_time.0,
             slicer_time_s: report.slicer_time.map(|time| time.0),

@@ -26,6 +26,8 @@ pub struct Snapshot {
     pub live_mm: Option<[f64; 4]>,
     /// How much higher Z's motor stands than `position_mm` has it: what makes up for a bed that is not flat.
     pub z_lift_mm: f64,
+    /// The bed mesh that is in force, by its name in the machine file.
+    pub mesh: Option<String>,
     /// Which of X, Y, Z are homed; the position of the others means nothing.
     pub homed: [bool; 3],
     /// The print.

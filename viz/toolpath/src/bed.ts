@@ -22,6 +22,8 @@ import type { Mm } from './units';
 export interface Bed {
   readonly minMm: readonly [Mm, Mm];
   readonly maxMm: readonly [Mm, Mm];
+  /** The ellipse within those limits, not the rectangle. */
+  readonly isRound?: boolean;
   /** How high the machine reaches; left out, no edges are drawn. */
   readonly heightMm?: Mm;
 }
@@ -31,10 +33,23 @@ const COARSE_EVERY = 5;
 /** More lines than this are no help and no bed has them: the grid is then wider. */
 const LINES_MAX = 400;
 /** The plate lies so much lower, for the depth buffer's sake. */
+/** Corners of a round bed. */
+const ROUND_CORNERS = 96;
 const PLATE_DROP_MM = 0.12;
 const GRID_DROP_MM = 0.06;
 
 type Triple = readonly [number, number, number];
+
+/** From where to where a line goes that has this place on the axis. */
+function across(bed: Bed, axis: 0 | 1, at: Mm): readonly [Mm, Mm] {
+  const other = axis === 0 ? 1 : 0;
+  const [min, max] = [bed.minMm[other], bed.maxMm[other]];
+  if (!bed.isRound) return [min, max];
+  const half = (bed.maxMm[axis] - bed.minMm[axis]) / 2;
+  const away = (at - bed.minMm[axis]) / half - 1;
+  const [middle, reach] = [(min + max) / 2, ((max - min) / 2) * Math.sqrt(Math.max(1 - away * away, 0))];
+  return [middle - reach, middle + reach];
+}
 
 /** Corners of the grid's lines, two a line. Lines lie on multiples of the spacing in the machine's own coordinates. */
 export function gridLines(bed: Bed): { readonly fine: number[]; readonly coarse: number[] } {
@@ -46,8 +61,9 @@ export function gridLines(bed: Bed): { readonly fine: number[]; readonly coarse:
     for (let line = Math.ceil(min / spacing); line * spacing <= max; line++) {
       const at = line * spacing;
       const to = line % COARSE_EVERY === 0 ? coarse : fine;
-      if (axis === 0) to.push(at, bed.minMm[1], -GRID_DROP_MM, at, bed.maxMm[1], -GRID_DROP_MM);
-      else to.push(bed.minMm[0], at, -GRID_DROP_MM, bed.maxMm[0], at, -GRID_DROP_MM);
+      const [from, end] = across(bed, axis, at);
+      if (axis === 0) to.push(at, from, -GRID_DROP_MM, at, end, -GRID_DROP_MM);
+      else to.push(from, at, -GRID_DROP_MM, end, at, -GRID_DROP_MM);
     }
   }
   return { fine, coarse };
@@ -71,6 +87,27 @@ const rectangle = ([x0, y0]: readonly [Mm, Mm], [x1, y1]: readonly [Mm, Mm], z: 
   [x0, y1, z],
 ];
 
+/** The bed's edge, against the clock. */
+function corners(bed: Bed, z: Mm): Triple[] {
+  if (!bed.isRound) return rectangle(bed.minMm, bed.maxMm, z);
+  const place = (axis: 0 | 1, share: number): Mm =>
+    (bed.minMm[axis] + bed.maxMm[axis] + share * (bed.maxMm[axis] - bed.minMm[axis])) / 2;
+  return Array.from({ length: ROUND_CORNERS }, (_, at): Triple => {
+    const angle = (2 * Math.PI * at) / ROUND_CORNERS;
+    return [place(0, Math.cos(angle)), place(1, Math.sin(angle)), z];
+  });
+}
+
+/** Triangles that fill a shape without dents. */
+function filled(corners: readonly Triple[]): number[] {
+  const [first] = corners;
+  if (!first) return [];
+  return corners.slice(1).flatMap((corner, at) => {
+    const next = corners[at + 2];
+    return next ? [...first, ...corner, ...next] : [];
+  });
+}
+
 const outline = (corners: readonly Triple[]): number[] =>
   corners.flatMap((corner, at) => [...corner, ...(corners[(at + 1) % corners.length] ?? corner)]);
 
@@ -83,20 +120,16 @@ export class BedObjects {
   /** Draws this bed in place of the one before. */
   set(bed: Bed): void {
     this.clear();
-    const plate = rectangle(bed.minMm, bed.maxMm, -PLATE_DROP_MM);
-    this.#add(
-      'bed',
-      [0, 1, 2, 0, 2, 3].flatMap((corner) => [...(plate[corner] ?? [])]),
-      true,
-    );
+    this.#add('bed', filled(corners(bed, -PLATE_DROP_MM)), true);
     const { fine, coarse } = gridLines(bed);
     this.#add('gridFine', fine);
     this.#add('gridCoarse', coarse);
-    const base = rectangle(bed.minMm, bed.maxMm, -GRID_DROP_MM);
+    const base = corners(bed, -GRID_DROP_MM);
     const edges = outline(base);
     if (bed.heightMm && bed.heightMm > 0) {
-      const top = rectangle(bed.minMm, bed.maxMm, bed.heightMm);
-      const posts = base.flatMap((corner, at) => [...corner, ...(top[at] ?? corner)]);
+      const top = corners(bed, bed.heightMm);
+      const isPost = (at: number): boolean => !bed.isRound || at % (ROUND_CORNERS / 4) === 0;
+      const posts = base.flatMap((corner, at) => (isPost(at) ? [...corner, ...(top[at] ?? corner)] : []));
       this.#add('gridCoarse', [...outline(top), ...posts]);
     }
     this.#add('bedEdge', edges);
@@ -142,12 +175,8 @@ export class BedObjects {
 /** A flat bar from the origin. */
 function axis([dx, dy]: readonly [number, number], length: Mm): number[] {
   const half = length / 24;
-  const corners: Triple[] = rectangle(
-    [dx ? 0 : -half, dy ? 0 : -half],
-    [dx ? length : half, dy ? length : half],
-    0,
-  );
-  return [0, 1, 2, 0, 2, 3].flatMap((corner) => [...(corners[corner] ?? [])]);
+  const from = [dx ? 0 : -half, dy ? 0 : -half] as const;
+  return filled(rectangle(from, [dx ? length : half, dy ? length : half], 0));
 }
 
 export function colour(material: RawShaderMaterial, hex: HexColour): void {

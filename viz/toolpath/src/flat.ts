@@ -37,6 +37,9 @@ interface Place {
   readonly scale: number;
 }
 
+/** More questions at once mean that nobody hears the answers. */
+const SETTLING_MAX = 64;
+
 const nothing = (): void => undefined;
 
 /** How far a point is from the line between two. */
@@ -68,6 +71,8 @@ export class FlatView implements View {
   #next: VertexIndex | null = null;
   #isWaiting = false;
   #isOver = false;
+  /** Questions whether the drawing is done. */
+  #settling: number[] = [];
 
   constructor(
     canvas: HTMLCanvasElement | OffscreenCanvas,
@@ -209,6 +214,11 @@ export class FlatView implements View {
     this.#tell({ type: 'slice', id, slice: { first, header, vertices, channels: new Uint32Array() } });
   }
 
+  settle(id: number): void {
+    if (this.#settling.length < SETTLING_MAX) this.#settling.push(id);
+    if (this.#next === null) this.#tellSettled();
+  }
+
   /** The segment that is nearest to the point, if it is near. */
   pick(x: CssPx, y: CssPx, id: number): void {
     const point: Point = [x, y];
@@ -295,9 +305,13 @@ export class FlatView implements View {
     this.#isWaiting = false;
     if (this.#isOver || this.#next === null) return;
     this.#drawPiece();
-    if (this.#next === null) return;
+    if (this.#next === null) return this.#tellSettled();
     this.#isWaiting = true;
     setTimeout(() => this.#continue());
+  }
+
+  #tellSettled(): void {
+    for (const id of this.#settling.splice(0)) this.#tell({ type: 'settled', id });
   }
 
   #drawPiece(): void {
@@ -355,11 +369,16 @@ export class FlatView implements View {
     if (!box) return;
     const [left, bottom] = this.#onScreen(box.min);
     const [right, top] = this.#onScreen(box.max);
+    context.beginPath();
+    if (this.#bed?.isRound) {
+      const [x, y] = [(left + right) / 2, (bottom + top) / 2];
+      context.ellipse(x, y, (right - left) / 2, (bottom - top) / 2, 0, 0, 2 * Math.PI);
+    } else context.rect(left, top, right - left, bottom - top);
     context.fillStyle = this.#palette.bed;
-    context.fillRect(left, top, right - left, bottom - top);
+    context.fill();
     context.strokeStyle = this.#palette.bedEdge;
     context.lineWidth = LINE_PX_MIN;
-    context.strokeRect(left, top, right - left, bottom - top);
+    context.stroke();
   }
 }
 

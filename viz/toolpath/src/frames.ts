@@ -58,6 +58,9 @@ const POLL_MS = 2;
 /** A GPU that is silent for so long has lost its context or is stuck: the loop goes on. */
 const FENCE_MAX_MS = 10_000;
 
+/** Those who wait for a picture at once; more are told with the last of them. */
+const RESTING_MAX = 64;
+
 type Picture = 'none' | 'begun' | 'complete';
 
 export class FrameLoop {
@@ -78,6 +81,7 @@ export class FrameLoop {
   #pictureBegan: Ms = 0;
   #pictureSegments = 0;
   #longest: Ms = 0;
+  #resting: (() => void)[] = [];
 
   constructor(painter: Painter, clock: FrameClock, report: (report: FrameReport) => void) {
     this.#painter = painter;
@@ -129,6 +133,13 @@ export class FrameLoop {
   overlaid(): void {
     if (this.#picture !== 'complete') return;
     this.#overlayWanted = true;
+    this.#schedule();
+  }
+
+  /** Calls back once what was asked for up to now is shown in full and nothing is under way. */
+  onRest(callback: () => void): void {
+    if (this.#isAtRest() && this.#poll === null) return callback();
+    if (this.#resting.length < RESTING_MAX) this.#resting.push(callback);
     this.#schedule();
   }
 
@@ -219,8 +230,14 @@ export class FrameLoop {
     return this.#quickWanted || this.#fullWanted || this.#patchWanted || this.#overlayWanted;
   }
 
+  #isAtRest(): boolean {
+    return this.#picture === 'complete' && !this.#isWanted() && this.#timer === null;
+  }
+
   #tell(report: Omit<FrameReport, 'more'>): void {
     this.#report({ ...report, more: this.#isWanted() || this.#timer !== null });
+    if (!this.#isAtRest()) return;
+    for (const callback of this.#resting.splice(0)) callback();
   }
 
   /** Waits for the GPU, then goes on with what is wanted. */

@@ -8,12 +8,12 @@ import type { Bed } from './bed';
 import type { BoxMm, CameraPreset, CameraState, Projection, Vec3 } from './camera';
 import type { ColourMode, ValueRange } from './colours';
 import type { Layer } from './layers';
+import type { BedMesh } from './mesh';
 import { carryOut, type View, type ViewEvent, type ViewRequest, type WorkerRequest } from './messages';
 import type { Theme } from './palette';
 import type { PictureSizePx } from './picture';
 import type { Shown } from './shown';
 import { Source } from './source';
-import type { BedMesh } from './surface';
 import type { CssPx, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
 import type { ViewSizePx } from './view';
@@ -21,12 +21,24 @@ import type { ViewSizePx } from './view';
 export interface ToolpathHostOptions {
   readonly size: ViewSizePx;
   readonly onEvent?: (event: ViewEvent) => void;
+  /** Told of every request from here that changes the picture, but of the nozzle's and the print's, which always move. */
+  readonly onChange?: () => void;
   /** True: draw on the main thread even where a worker could. */
   readonly mainThread?: boolean;
 }
 
 /** Requests kept until the view on the main thread is loaded; more mean that it never will be. */
 const WAITING_MAX = 10_000;
+
+/** Questions, and what follows a print by itself. */
+const NO_CHANGES: ReadonlySet<ViewRequest['type']> = new Set([
+  'pick',
+  'picture',
+  'slice',
+  'settle',
+  'setNozzle',
+  'setPrintedUpTo',
+]);
 
 const canTransfer = (canvas: HTMLCanvasElement): boolean =>
   typeof OffscreenCanvas !== 'undefined' &&
@@ -35,6 +47,7 @@ const canTransfer = (canvas: HTMLCanvasElement): boolean =>
 
 export class ToolpathHost {
   readonly #onEvent: (event: ViewEvent) => void;
+  readonly #onChange: () => void;
   readonly #worker: Worker | null;
   readonly #source = new Source((request) => this.send(request));
   #view: View | null = null;
@@ -44,6 +57,7 @@ export class ToolpathHost {
   /** Takes the canvas over for good. */
   constructor(canvas: HTMLCanvasElement, options: ToolpathHostOptions) {
     this.#onEvent = options.onEvent ?? (() => undefined);
+    this.#onChange = options.onChange ?? (() => undefined);
     if (options.mainThread || !canTransfer(canvas)) {
       this.#worker = null;
       void this.#startHere(canvas, options.size);
@@ -150,6 +164,10 @@ export class ToolpathHost {
   slice(first: VertexIndex, end: VertexIndex, id: number): void {
     this.send({ type: 'slice', first, end, id });
   }
+  /** Asks when all that was asked for up to now is shown in full detail; the answer is the event `settled` with this id. */
+  settle(id: number): void {
+    this.send({ type: 'settle', id });
+  }
   resize(size: ViewSizePx): void {
     this.send({ type: 'resize', size });
   }
@@ -170,6 +188,7 @@ export class ToolpathHost {
 
   send(request: ViewRequest, transfer: Transferable[] = []): void {
     if (this.#disposed) return;
+    if (!NO_CHANGES.has(request.type)) this.#onChange();
     if (this.#worker) this.#post(request, transfer);
     else if (this.#view) carryOut(this.#view, request);
     else if (this.#waiting.length < WAITING_MAX) this.#waiting.push(request);

@@ -17,12 +17,12 @@ export { attachControls } from './controls';
 export type { FrameReport } from './frames';
 export { ToolpathHost, type ToolpathHostOptions } from './host';
 export type { Layer } from './layers';
+export { type BedMesh, exaggerationOf, heightRange } from './mesh';
 export type { Slice, SourcedRequest, ViewEvent, ViewRequest } from './messages';
 export { type HexColour, PALETTES, type Palette, type Theme } from './palette';
 export type { PictureSizePx } from './picture';
 export type { Shown } from './shown';
 export { SLICE_MAX } from './slice';
-export { type BedMesh, exaggerationOf, heightRange } from './surface';
 export type { CssPx, LayerIndex, Mm, Ms, Radians, VertexIndex } from './units';
 export {
   decodeVertex,

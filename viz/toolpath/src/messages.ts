@@ -9,10 +9,10 @@ import type { BoxMm, CameraPreset, CameraState, Projection, Vec3 } from './camer
 import type { ColourMode, ColourRanges, ValueRange } from './colours';
 import type { FrameReport } from './frames';
 import type { Layer } from './layers';
+import type { BedMesh } from './mesh';
 import type { Theme } from './palette';
 import type { PictureSizePx } from './picture';
 import type { Shown } from './shown';
-import type { BedMesh } from './surface';
 import type { CssPx, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
 import type { ToolpathView, ViewSizePx } from './view';
@@ -49,6 +49,7 @@ export type ViewRequest =
   /** The camera goes with the nozzle. */
   | { readonly type: 'setFollow'; readonly follow: boolean }
   | { readonly type: 'slice'; readonly first: VertexIndex; readonly end: VertexIndex; readonly id: number }
+  | { readonly type: 'settle'; readonly id: number }
   | { readonly type: 'resize'; readonly size: ViewSizePx };
 
 /** A request from elsewhere, for the reading of one file; later readings have greater numbers. */
@@ -88,6 +89,8 @@ export type ViewEvent =
   /** A PNG; null where none could be made. */
   | { readonly type: 'picture'; readonly id: number; readonly blob: Blob | null }
   | { readonly type: 'slice'; readonly id: number; readonly slice: Slice }
+  /** All that was asked for before the question is shown, in full detail. */
+  | { readonly type: 'settled'; readonly id: number }
   | { readonly type: 'contextLost' }
   | { readonly type: 'contextRestored' };
 
@@ -148,6 +151,8 @@ export function carryOut(view: View, request: ViewRequest): void {
       return view.setFollow(request.follow);
     case 'slice':
       return view.slice(request.first, request.end, request.id);
+    case 'settle':
+      return view.settle(request.id);
     case 'resize':
       return view.resize(request.size);
   }

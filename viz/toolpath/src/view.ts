@@ -26,6 +26,7 @@ import { Content } from './content';
 import { Drawing, EMPTY_BOX, type Model } from './drawing';
 import { FrameLoop, realmClock } from './frames';
 import type { Layer } from './layers';
+import { type BedMesh, isMesh } from './mesh';
 import type { ViewEvent } from './messages';
 import { PALETTES, type Palette, type Theme } from './palette';
 import { ALL_PRINTED } from './path_uniforms';
@@ -33,7 +34,6 @@ import { PictureMaker, type PictureSizePx } from './picture';
 import { segmentAt } from './segment';
 import { SHOW_ALL, type Shown, validRange } from './shown';
 import { sliceOf } from './slice';
-import { type BedMesh, isMesh } from './surface';
 import type { CssPx, Ms, VertexIndex } from './units';
 import type { VertexHeader } from './vertex';
 
@@ -260,6 +260,13 @@ export class ToolpathView {
     const vertices = content ? sliceOf(content.store, range) : new Uint32Array();
     const channels = content ? sliceOf(content.channels, range) : new Uint32Array();
     this.#tell({ type: 'slice', id, slice: { first, header: content?.header ?? null, vertices, channels } });
+  }
+
+  /** Tells once all that was asked for up to now is shown in full detail. */
+  settle(id: number): void {
+    // What is still being found out may change the colours.
+    if (this.#rangesTimer !== null) setTimeout(() => this.settle(id), RANGES_MS);
+    else this.#loop.onRest(() => this.#tell({ type: 'settled', id }));
   }
 
   setTheme(theme: Theme): void {

@@ -124,7 +124,9 @@ describe('the loop of frames', () => {
     expect(patches()).toBe(1);
     expect(reports.filter(({ kind }) => kind === 'full')).toHaveLength(1);
   });
+});
 
+describe('the loop of frames, besides moving pictures', () => {
   test('what lies over the picture moves without drawing the picture anew', () => {
     const { clock, loop, reports, overlays } = setUp(300_000, 0.001);
     loop.overlaid();
@@ -138,6 +140,21 @@ describe('the loop of frames', () => {
     expect(overlays()).toBe(10);
     expect(reports.filter(({ kind }) => kind === 'full')).toHaveLength(1);
     expect(clock.idle).toBe(true);
+  });
+
+  test('who waits for the picture is told once it is full, and at once where it is', () => {
+    const { clock, loop, reports } = setUp(1_000_000, 0.001);
+    const told: string[] = [];
+    loop.moved();
+    loop.onRest(() => told.push(`first, behind ${reports.at(-1)?.kind}`));
+    clock.run(500);
+    expect(told).toEqual([]);
+    loop.moved();
+    loop.onRest(() => told.push('second'));
+    clock.run(5_000);
+    expect(told).toEqual(['first, behind full', 'second']);
+    loop.onRest(() => told.push('third'));
+    expect(told).toHaveLength(3);
   });
 
   test('a lost context stops it, a restored one starts it again', () => {

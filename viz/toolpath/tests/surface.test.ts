@@ -1,5 +1,6 @@
 import { describe, expect, test } from 'vitest';
-import { exaggerationOf, isMesh, meshCorners } from '../src/surface';
+import { exaggerationOf, isMesh } from '../src/mesh';
+import { meshCorners } from '../src/surface';
 
 const MESH = {
   originMm: [10, 20],

@@ -1,5 +1,6 @@
 // Generated from planner-wasm/src/messages by `cargo xtask bindings`. Do not edit.
 import type { HeaterSummary } from './HeaterSummary';
+import type { MeshSummary } from './MeshSummary';
 import type { MmPerS2, MmPerS, Mm } from './units';
 
 /**
@@ -14,6 +15,10 @@ min_mm: [Mm, Mm, Mm],
  * The highest X, Y, Z allowed.
  */
 max_mm: [Mm, Mm, Mm], 
+/**
+ * How far the head reaches from the middle where the bed is round; `null` where it is not.
+ */
+bed_radius_mm: Mm | null, 
 /**
  * Where each axis finds its endstop.
  */
@@ -50,6 +55,10 @@ filament_mm: Mm | null,
  * Heaters.
  */
 heaters: Array<HeaterSummary>, 
+/**
+ * Bed meshes that a print may load.
+ */
+meshes: Array<MeshSummary>, 
 /**
  * Whether there is a part fan.
  */

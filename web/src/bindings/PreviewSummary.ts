@@ -5,6 +5,7 @@ import type { Blocking } from './Blocking';
 import type { LayerSummary } from './LayerSummary';
 import type { FeatureSummary } from './FeatureSummary';
 import type { ObjectSummary } from './ObjectSummary';
+import type { ToolSummary } from './ToolSummary';
 import type { Mm, Seconds } from './units';
 
 /**
@@ -56,6 +57,10 @@ vertices: number,
  */
 clamped: number, 
 /**
+ * Vertices beyond what can be shown, which are left out.
+ */
+left_out: number, 
+/**
  * Layers; those beyond 65 536 are part of the last.
  */
 layers: Array<LayerSummary>, 
@@ -67,6 +72,10 @@ features: Array<FeatureSummary>,
  * The objects that the file names, at most 254; the first has number 1 in the vertices.
  */
 objects: Array<ObjectSummary>, 
+/**
+ * The tools that lay filament.
+ */
+tools: Array<ToolSummary>, 
 /**
  * Print time of the whole, planned for the machine; `null` without one, or where the plan fails.
  */

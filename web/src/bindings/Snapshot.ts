@@ -40,6 +40,10 @@ live_mm: [Mm, Mm, Mm, Mm] | null,
  */
 z_lift_mm: Mm, 
 /**
+ * The bed mesh that is in force, by its name in the machine file.
+ */
+mesh: string | null, 
+/**
  * Which of X, Y, Z are homed; the position of the others means nothing.
  */
 homed: [boolean, boolean, boolean], 

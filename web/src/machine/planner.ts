@@ -177,6 +177,7 @@ function fromSnapshot(now: PlannerSnapshot): SessionSnapshot {
     })),
     position: position && place(position),
     zLift: mm(now.z_lift_mm),
+    mesh: now.mesh,
     homed: now.homed,
     job: now.job.status,
     start: now.job.start && {

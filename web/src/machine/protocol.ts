@@ -78,6 +78,8 @@ export interface Snapshot {
   readonly position: readonly [Mm, Mm, Mm, Mm] | null;
   /** How much higher Z's motor stands than `position` has it, at rest: what makes up for a bed that is not flat. */
   readonly zLift: Mm;
+  /** The bed mesh that is in force, by its name in the machine file. */
+  readonly mesh: string | null;
   readonly homed: readonly [boolean, boolean, boolean];
   readonly job: JobStatus;
   /** The print is paused before its first line, which is in the middle of its file. */

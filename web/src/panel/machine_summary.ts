@@ -1,10 +1,10 @@
 // What the profile in use describes, as the planner reads it: limits for fields, the bed for the 3D view.
-import { effect, signal } from '@preact/signals';
-import type { MachineSummary } from '../preview/protocol';
+import { effect } from '@preact/signals';
+import { machineSummary } from '../state/mesh';
 import { checkConfig } from '../state/preview';
 import { activeProfile } from '../state/profiles';
 
-export const machineSummary = signal<MachineSummary | null>(null);
+export { machineSummary };
 
 /** Reads the profile again whenever it changes. */
 export function followProfile(): void {

@@ -3,6 +3,7 @@ import type { JSX } from 'preact';
 import { file, outline, reading } from '../state/preview';
 import { settings } from '../state/settings';
 import { Icon } from './icons';
+import { formatNumber } from './numbers';
 import { openSample, pickFile } from './open_file';
 import { Button } from './parts';
 import { Canvas, isFlat, viewFailure } from './view/canvas';
@@ -26,6 +27,28 @@ function NoView({ reason }: { readonly reason: string }): JSX.Element {
       </p>
       <p class="hint">{reason}</p>
     </details>
+  );
+}
+
+/** What the view does not show of the file, or not where it is. */
+function Short(): JSX.Element | null {
+  const { leftOut = 0, clamped = 0, vertices = 0 } = outline.value ?? {};
+  if (leftOut === 0 && clamped === 0) return null;
+  return (
+    <div class="view-short" role="status">
+      {leftOut > 0 && (
+        <p>
+          The first {formatNumber(vertices)} moves are shown, which is as many as fit; {formatNumber(leftOut)}{' '}
+          are not.
+        </p>
+      )}
+      {clamped > 0 && (
+        <p>
+          {formatNumber(clamped)} {clamped === 1 ? 'place lies' : 'places lie'} far outside the machine and{' '}
+          {clamped === 1 ? 'is' : 'are'} shown nearer than that.
+        </p>
+      )}
+    </div>
   );
 }
 
@@ -59,6 +82,7 @@ export function Viewer(): JSX.Element {
           {!file.value && <Empty />}
           <div class="over-left">
             {viewFailure.value && <NoView reason={viewFailure.value} />}
+            {hasView && <Short />}
             {hasView && <ViewTools isFlat={isFlat.value} />}
           </div>
           {outline.value && hasView && (

@@ -80,6 +80,13 @@ function checkConfig(text: string): ConfigReport {
         min: mm(machine.min_mm[axis] ?? 0),
         max: mm(machine.max_mm[axis] ?? 0),
       })),
+      bedRadius: machine.bed_radius_mm === null ? null : mm(machine.bed_radius_mm),
+      meshes: machine.meshes.map(({ name, min_mm, step_mm, heights_mm }) => ({
+        name,
+        origin: [mm(min_mm[0]), mm(min_mm[1])],
+        step: [mm(step_mm[0]), mm(step_mm[1])],
+        rows: heights_mm.map((row) => row.map(mm)),
+      })),
       heaters: machine.heaters.map(({ name, max_c, min_extrude_c }) => ({
         name,
         max: celsius(max_c),
@@ -126,6 +133,9 @@ function fromSummary(summary: PreviewSummary): Summary {
       centre: centre_mm && [mm(centre_mm[0]), mm(centre_mm[1])],
       filament: mm(filament_mm),
     })),
+    tools: summary.tools.map(({ tool, filament_mm }) => ({ tool, filament: mm(filament_mm) })),
+    leftOut: Number(summary.left_out),
+    clamped: Number(summary.clamped),
     generator: summary.generator,
   };
 }

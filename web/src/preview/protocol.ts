@@ -35,6 +35,12 @@ export interface ObjectShare {
   readonly filament: Mm;
 }
 
+export interface ToolShare {
+  /** The tool's number in the vertices. */
+  readonly tool: number;
+  readonly filament: Mm;
+}
+
 /** A picture of the print that its slicer put into the file. */
 export interface Thumbnail {
   /** PNG or JPEG. */
@@ -63,6 +69,12 @@ export interface Summary {
   readonly features: readonly FeatureShare[];
   /** The first has number 1 in the vertices. */
   readonly objects: readonly ObjectShare[];
+  /** Those that lay filament. */
+  readonly tools: readonly ToolShare[];
+  /** Moves that are not shown: there are more than the view can hold. */
+  readonly leftOut: number;
+  /** Places so far off the machine that they are shown nearer. */
+  readonly clamped: number;
   /** The program that wrote the file, where it says so. */
   readonly generator: string | null;
 }
@@ -80,9 +92,24 @@ export interface MachineAxis {
   readonly max: Mm;
 }
 
+/** A bed's shape as it was measured. */
+export interface MachineMesh {
+  readonly name: string;
+  /** X and Y of the first point. */
+  readonly origin: readonly [Mm, Mm];
+  /** From point to point along X and along Y. */
+  readonly step: readonly [Mm, Mm];
+  /** Row by row, the lowest Y first. */
+  readonly rows: readonly (readonly Mm[])[];
+}
+
 /** What a printer.cfg describes. */
 export interface MachineSummary {
   readonly axes: readonly MachineAxis[];
+  /** How far the head reaches from the middle of a round bed; null where it is not round. */
+  readonly bedRadius: Mm | null;
+  /** Those that a print may load. */
+  readonly meshes: readonly MachineMesh[];
   readonly heaters: readonly HeaterLimits[];
   /** The longest push of filament at once; null where the file sets none. */
   readonly extrudeMax: Mm | null;
@@ -144,6 +171,8 @@ export type FromPreview =
   /** One byte a vertex, in order: how many lines further than the one before it it comes from; 255 where a mark says. */
   | { readonly kind: 'line-steps'; readonly job: number; readonly steps: Uint8Array<ArrayBuffer> }
   | { readonly kind: 'thumbnails'; readonly job: number; readonly thumbnails: readonly Thumbnail[] }
+  /** The file is packed and too large to be kept unpacked: any look at its text reads it from its beginning. */
+  | { readonly kind: 'slow-text'; readonly job: number }
   | { readonly kind: 'progress'; readonly job: number; readonly share: number; readonly lines: number }
   /** The geometry is whole: the summary without times, and without what the machine cannot do. */
   | { readonly kind: 'outline'; readonly job: number; readonly outline: Summary }

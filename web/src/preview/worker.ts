@@ -9,6 +9,7 @@ import { LineIndex } from './line_index';
 import { type FilePreview, loadReader, type Reader } from './planner';
 import type { FromPreview, Summary, ToPreview } from './protocol';
 import { SlicedFile } from './sliced_file';
+import { Unpacked } from './unpacked';
 
 /** Progress is told this often at most, in ms. */
 const PROGRESS_MS = 50;
@@ -53,8 +54,9 @@ function draw(job: number, request: ViewRequest, transfer: Transferable[] = []):
 interface Opened {
   readonly job: number;
   readonly file: Blob;
-  readonly packing: Packing;
   readonly index: LineIndex;
+  /** Of a packed file, as far as it has been read; null where it is none. */
+  readonly unpacked: Unpacked | null;
 }
 let opened: Opened | undefined;
 
@@ -114,12 +116,13 @@ const GEOMETRY_SHARE = 0.35;
 
 /** The geometry as it is read, and the outline at its end; null where the file was put away meanwhile. */
 async function readGeometry(chunks: Chunks, preview: FilePreview, open: Opened): Promise<Summary | null> {
-  const { job, file, index } = open;
+  const { job, file, index, unpacked } = open;
   const told = progress(job);
   draw(job, { type: 'begin', header: preview.header() });
   for (let chunk = await chunks.next(); chunk; chunk = await chunks.next()) {
     if (current !== job) return null;
     index.add(chunk);
+    unpacked?.add(chunk);
     feed(preview, job, chunk, pass);
     told((GEOMETRY_SHARE * chunks.bytesRead) / Math.max(1, file.size), index.lines);
   }
@@ -158,8 +161,8 @@ async function through<T>(
   read: (chunks: Chunks, preview: FilePreview, open: Opened) => Promise<T>,
 ): Promise<T> {
   try {
-    if (open.packing === 'plain') return await read(new SlicedFile(open.file), preview, open);
-    const chunks = await FileChunks.open(open.file, open.packing);
+    if (!open.unpacked) return await read(new SlicedFile(open.file), preview, open);
+    const chunks = await FileChunks.open(open.file, 'gzip');
     try {
       return await read(chunks, preview, open);
     } finally {
@@ -191,11 +194,13 @@ async function read(
   const refusal = await refusalOf(reader, file, packing, name);
   if (refusal) return tell({ kind: 'failed', job, trouble: refusal });
   if (current !== job) return;
-  const open = { job, file, packing, index: new LineIndex() };
+  const unpacked = packing === 'gzip' ? new Unpacked() : null;
+  const open = { job, file, index: new LineIndex(), unpacked };
   opened = open;
   const { preview, config } = openGeometry(reader, machine);
   const outline = await through(open, preview, readGeometry);
   if (!outline || current !== job) return;
+  if (unpacked?.isGivenUp) tell({ kind: 'slow-text', job });
   if (config === null) tell({ kind: 'summary', job, summary: outline });
   else await through(open, reader.preview(config), readPlan);
 }
@@ -235,12 +240,13 @@ async function tellLines({ id, file, first, last }: ToPreview & { kind: 'lines' 
 /** The last question for the open file's text. */
 let textAsked = 0;
 
-/** Any line is found by reading a few tens of kilobytes, but in a packed file, which is read from its beginning. */
+/** Any line is found by reading a few tens of kilobytes, but in a packed file that is too large to be kept unpacked. */
 async function textOf(open: Opened, first: number, last: number, id: number): Promise<string[]> {
   const isWanted = (): boolean => textAsked === id && opened === open;
-  if (open.packing === 'gzip') return await linesOf(open.file, first, last, isWanted, 'gzip');
+  const plain = open.unpacked ? open.unpacked.text() : open.file;
+  if (!plain) return await linesOf(open.file, first, last, isWanted, 'gzip');
   const { line, offset } = open.index.before(first);
-  return await linesOf(open.file.slice(offset), first - line + 1, last - line + 1, isWanted, 'plain');
+  return await linesOf(plain.slice(offset), first - line + 1, last - line + 1, isWanted, 'plain');
 }
 
 async function tellText({ id, job, first, last }: ToPreview & { kind: 'text' }): Promise<void> {

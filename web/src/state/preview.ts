@@ -32,6 +32,8 @@ export const summary = signal<Summary | null>(null);
  */
 export const outline = signal<Summary | null>(null);
 export const failure = signal<Trouble | null>(null);
+/** Its text takes a while to come: it is packed, and too large to be kept unpacked. */
+export const isTextSlow = signal(false);
 /** Lines that have been read of it so far. */
 export const linesRead = signal(0);
 /** The pictures of the print that are in it; a handful at most. */
@@ -155,6 +157,7 @@ function read(config: string): void {
   confirmed.value = new Set();
   marks = new LineMarks();
   linesRead.value = 0;
+  isTextSlow.value = false;
   thumbnails.value = [];
   sink?.discard(job);
   if (!worker && lastDeath) {
@@ -179,6 +182,7 @@ export function closeFile(): void {
   outline.value = null;
   failure.value = null;
   linesRead.value = 0;
+  isTextSlow.value = false;
   thumbnails.value = [];
   sink?.discard(job);
   send({ kind: 'close', job });
@@ -246,6 +250,9 @@ function take(message: FromPreview): void {
       break;
     case 'line-steps':
       marks.appendSteps(message.steps);
+      break;
+    case 'slow-text':
+      isTextSlow.value = true;
       break;
     case 'thumbnails':
       thumbnails.value = [...thumbnails.value, ...message.thumbnails];

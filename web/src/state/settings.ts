@@ -34,6 +34,8 @@ export interface Settings {
   readonly showSeams: boolean;
   readonly showToolChanges: boolean;
   readonly showPauses: boolean;
+  /** The bed's shape over the plate. */
+  readonly showMesh: boolean;
   readonly isOrthographic: boolean;
   /** The camera goes with the nozzle while something is printed. */
   readonly followNozzle: boolean;
@@ -75,6 +77,7 @@ export const DEFAULTS: Settings = {
   showSeams: false,
   showToolChanges: false,
   showPauses: false,
+  showMesh: false,
   isOrthographic: false,
   followNozzle: false,
   showText: false,
@@ -130,6 +133,7 @@ export function readSettings(text: string | null): Settings {
     showSeams: stored.showSeams === true,
     showToolChanges: stored.showToolChanges === true,
     showPauses: stored.showPauses === true,
+    showMesh: stored.showMesh === true,
     isOrthographic: stored.isOrthographic === true,
     followNozzle: stored.followNozzle === true,
     showText: stored.showText === true,

@@ -52,6 +52,11 @@ export async function verticesOf(first: number, end: number): Promise<Slice | nu
   return answer?.type === 'slice' ? answer.slice : null;
 }
 
+/** Waits until all that the view was asked for up to now is shown in full detail, or there is no view. */
+export async function settled(): Promise<void> {
+  await ask((view, id) => view.settle(id));
+}
+
 /** A PNG of the view in full detail. */
 export async function pictureOf(width: number, height: number): Promise<Blob | null> {
   const answer = await ask((view, id) => view.picture(id, { width, height }));

@@ -8,7 +8,7 @@ use gcode::{Annotation, Move};
 use super::layers::Layers;
 use super::objects::Objects;
 use super::vertex::{
-    FEATURE_UNNAMED, FEATURES, Flags, Grid, Vertex, feature_number, height_units, width_units,
+    FEATURE_UNNAMED, FEATURES, Flags, Grid, TOOLS, Vertex, feature_number, height_units, width_units,
 };
 
 /// The most vertices of a file: 4 GiB of them.
@@ -68,6 +68,8 @@ pub(super) struct Encoder {
     pub(super) left_out: u64,
     pub(super) layers: Layers,
     pub(super) filament_mm: [f64; FEATURES],
+    /// What each tool lays; those beyond the last count as that.
+    pub(super) tool_filament_mm: [f64; TOOLS],
     /// Pairs of a line and the vertex at which its segment ends.
     pub(super) marks: Vec<u32>,
     /// How many lines further each vertex comes from than the one before it.
@@ -110,6 +112,7 @@ impl Encoder {
             left_out: 0,
             layers: Layers::new(),
             filament_mm: [0.0; FEATURES],
+            tool_filament_mm: [0.0; TOOLS],
             marks: Vec::new(),
             line_steps: Vec::new(),
             objects: Objects::default(),
@@ -194,6 +197,7 @@ impl Encoder {
             return Segment::Travel;
         }
         self.filament_mm[usize::from(self.feature).min(FEATURES - 1)] += filament;
+        self.tool_filament_mm[(self.tool as usize).min(TOOLS - 1)] += filament;
         self.objects.lay(filament);
         Segment::Extrusion(self.feature)
     }

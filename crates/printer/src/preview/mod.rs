@@ -76,6 +76,15 @@ pub struct FeatureReport {
     pub filament: Mm,
 }
 
+/// What is printed by one tool.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToolReport {
+    /// Its number in the vertices.
+    pub tool: u8,
+    /// Filament laid.
+    pub filament: Mm,
+}
+
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreviewReport {
@@ -93,6 +102,8 @@ pub struct PreviewReport {
     pub features: Vec<FeatureReport>,
     /// The objects that the file names; the first has number 1 in the vertices.
     pub objects: Vec<ObjectReport>,
+    /// The tools that lay filament.
+    pub tools: Vec<ToolReport>,
     /// Print time of the whole; `None` without a machine, or where a move cannot be planned.
     pub print_time: Option<Seconds>,
     /// Of it, moving without extruding, and dwells.
@@ -321,12 +332,17 @@ impl Preview {
             z: layer.z,
             time: Seconds(layer_s.get(number).copied().unwrap_or(0.0)),
         });
+        let tools = self.encoder.tool_filament_mm.into_iter().enumerate();
         PreviewReport {
             vertices: self.encoder.count,
             clamped: self.encoder.clamped,
             left_out: self.encoder.left_out,
             layers: layers.collect(),
             features,
+            tools: tools
+                .filter(|&(_, filament)| filament > 0.0)
+                .map(|(tool, filament)| ToolReport { tool: tool as u8, filament: Mm(filament) })
+                .collect(),
             objects: self.encoder.objects.into_list(),
             print_time,
             travel_time: Seconds(print_time.map_or(0.0, |time| (time.0 - in_features).max(0.0))),

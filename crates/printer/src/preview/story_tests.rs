@@ -57,7 +57,8 @@ fn objects_of_both_dialects_reach_the_vertices_and_the_report() {
 #[test]
 fn changes_and_pauses_are_told_where_they_happen() {
     let text = "T1\nM0\nG28\nG90\nM83\nG1 X1 F6000\nT1\nG1 X2 E1\nT0\nG1 X3\nM600\nG1 X4\nPAUSE\nG28 X\nM601\nG1 X5\nM25\n";
-    let (vertices, _, _) = read(text, usize::MAX);
+    let (vertices, _, preview) = read(text, usize::MAX);
+    assert_eq!(preview.finish().tools, [ToolReport { tool: 1, filament: Mm(1.0) }]);
     let begin = Flags::BREAK.and(Flags::TRAVEL).and(Flags::PAUSE);
     let refill = Flags::TRAVEL.and(Flags::PAUSE).and(Flags::FILAMENT_CHANGE);
     let pause = Flags::TRAVEL.and(Flags::PAUSE);

@@ -24,6 +24,8 @@ const OBJECT_SHIFT: u32 = 24;
 const EVENT_SHIFT: u32 = 29;
 /// The feature before a file names one.
 pub const FEATURE_UNNAMED: u8 = 16;
+/// How many tools have a number of their own.
+pub const TOOLS: usize = TOOL_MAX as usize + 1;
 /// How many features have a number.
 pub const FEATURES: usize = 17;
 

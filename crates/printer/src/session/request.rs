@@ -214,6 +214,14 @@ impl Session {
         }
     }
 
+    /// The bed mesh that is in force, by its name in the machine file.
+    pub fn mesh(&self) -> Option<&str> {
+        match &self.stage {
+            Stage::Ready(ready) => ready.planner.transform().mesh().map(|mesh| mesh.name.as_str()),
+            _ => None,
+        }
+    }
+
     /// The speed and flow factors of what is planned from now on, 1 is as written: the job's, or those of what is typed.
     pub fn factors(&self) -> [f64; 2] {
         match &self.stage {

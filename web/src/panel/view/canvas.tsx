@@ -3,9 +3,11 @@ import { effect, signal } from '@preact/signals';
 import { attachControls, ToolpathHost, type ViewEvent } from '@stepcast/toolpath';
 import type { JSX } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
+import type { MachineMesh } from '../../preview/protocol';
 import { followText } from '../../state/file_text';
 import { followCursor, lookUp, type Segment } from '../../state/inspect';
 import { isPrinting, isReady, snapshot } from '../../state/machine';
+import { machineSummary, meshInView, surfaceOf } from '../../state/mesh';
 import { stop, toggle } from '../../state/playback';
 import { file, outline, setSink } from '../../state/preview';
 import { isShown, printedVertex } from '../../state/print';
@@ -26,8 +28,7 @@ import {
   showLayers,
   topLayer,
 } from '../../state/view';
-import { answerWith, takeAnswer, vertexAt } from '../../state/view_answers';
-import { machineSummary } from '../machine_summary';
+import { answerWith, settled, takeAnswer, vertexAt } from '../../state/view_answers';
 
 /** Why there is no 3D view; null where there is one. */
 export const viewFailure = signal<string | null>(null);
@@ -35,6 +36,20 @@ export const viewFailure = signal<string | null>(null);
 export const isFlat = signal(false);
 /** What is seen is not yet the full picture. */
 const isDrawing = signal(false);
+let hasChanged = false;
+
+/** Something else is to be seen: the view is busy until that is drawn, and what was asked for meanwhile. */
+async function awaitPicture(): Promise<void> {
+  hasChanged = true;
+  if (isDrawing.peek()) return;
+  isDrawing.value = true;
+  while (hasChanged) {
+    hasChanged = false;
+    await settled();
+  }
+  isDrawing.value = false;
+}
+
 /** The view that is there, for the buttons over it. */
 export const view = signal<ToolpathHost | null>(null);
 /** What the pointer rests on, and where in the view. */
@@ -91,12 +106,27 @@ function followNozzle(host: ToolpathHost): () => void {
   });
 }
 
+/** The bed's shape, where there is one and it is to be seen. */
+function followMesh(host: ToolpathHost): () => void {
+  let told: MachineMesh | null = null;
+  return effect(() => {
+    const mesh = settings.value.showMesh ? meshInView.value : null;
+    if (mesh !== told) host.setMesh(mesh && surfaceOf(mesh));
+    told = mesh;
+  });
+}
+
 /** The bed, and what of the machine's room the print may use. */
 function followMachine(host: ToolpathHost): () => void {
   return effect(() => {
     const [x, y, z] = machineSummary.value?.axes ?? [];
     if (!x || !y) return;
-    host.setBed({ minMm: [x.min, y.min], maxMm: [x.max, y.max] });
+    const radius = machineSummary.value?.bedRadius ?? null;
+    host.setBed(
+      radius === null
+        ? { minMm: [x.min, y.min], maxMm: [x.max, y.max] }
+        : { minMm: [-radius, -radius], maxMm: [radius, radius], isRound: true },
+    );
     host.setVolume({ min: [x.min, y.min, z?.min ?? 0], max: [x.max, y.max, z?.max ?? Infinity] });
     if (!file.peek()) host.fit();
   });
@@ -169,11 +199,16 @@ function follow(host: ToolpathHost): () => void {
   followText();
   const ends = [
     followMachine(host),
+    followMesh(host),
     followShown(host),
     followColours(host),
     followPrint(host),
     followNozzle(host),
     followCursor(),
+    // What comes past the page is behind it once the outline or the summary is there.
+    effect(() => {
+      if (outline.value) void awaitPicture();
+    }),
   ];
   return () => {
     for (const end of ends) end();
@@ -186,8 +221,6 @@ function take(event: ViewEvent): void {
     viewFailure.value = event.reason;
     isFlat.value = event.isFlat;
   }
-  if (event.type === 'frame' && event.report.kind !== 'overlay')
-    isDrawing.value = event.report.kind === 'quick';
   if (event.type === 'ranges') ranges.value = { found: event.ranges, isWhole: event.isWhole };
 }
 
@@ -280,7 +313,11 @@ export function Canvas(): JSX.Element {
     // A canvas is given away once, so each view has one of its own.
     const canvas = document.createElement('canvas');
     parent.append(canvas);
-    const host = new ToolpathHost(canvas, { size: sizeOf(parent), onEvent: take });
+    const host = new ToolpathHost(canvas, {
+      size: sizeOf(parent),
+      onEvent: take,
+      onChange: () => void awaitPicture(),
+    });
     view.value = host;
     answerWith(host);
     const releases = [attachControls(parent, host), attachPicking(parent), follow(host)];
@@ -303,7 +340,7 @@ export function Canvas(): JSX.Element {
       class="canvas-place"
       role="application"
       aria-label={label}
-      aria-busy={isDrawing.value}
+      aria-busy={isDrawing.value && (viewFailure.value === null || isFlat.value)}
       // biome-ignore lint/a11y/noNoninteractiveTabindex: the view is turned by keyboard
       tabIndex={0}
       onKeyDown={onKey}

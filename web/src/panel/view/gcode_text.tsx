@@ -6,7 +6,7 @@ import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import { lineText, textVersion, wantLines } from '../../state/file_text';
 import { lineInView } from '../../state/inspect';
 import { stop } from '../../state/playback';
-import { linesRead, outline } from '../../state/preview';
+import { isTextSlow, linesRead, outline } from '../../state/preview';
 import { isShown, progress } from '../../state/print';
 import { chooseLine, cursor } from '../../state/view';
 import { formatNumber } from '../numbers';
@@ -162,6 +162,11 @@ export function GcodeText(): JSX.Element {
           disabled={!outline.value}
           onSet={(line) => chooseLine(Math.round(line))}
         />
+        {isTextSlow.value && (
+          <p class="hint" role="status">
+            This file is packed and very large: lines take a while to come.
+          </p>
+        )}
       </header>
       <div
         ref={place}

@@ -7,12 +7,14 @@ import {
   FEATURES,
   type HexColour,
   PALETTES,
+  type Palette,
   PLANNED_MODES,
-  RAMP,
+  RAMPS,
 } from '@stepcast/toolpath';
 import type { JSX } from 'preact';
 import { outline, summary } from '../../state/preview';
 import { change, type Settings, settings } from '../../state/settings';
+import { isDark } from '../../state/theme';
 import {
   chosenObject,
   hiddenFeatures,
@@ -25,7 +27,11 @@ import {
 } from '../../state/view';
 import { formatDuration, formatNumber } from '../numbers';
 import { Button, NumberField } from '../parts';
-import { FEATURE_NAMES, MODES } from './words';
+import { MeshPart } from './mesh';
+import { FEATURE_NAMES, gradient, MODES } from './words';
+
+/** The view's own colours, as it has them in this theme. */
+const palette = (): Palette => PALETTES[isDark.value ? 'dark' : 'light'];
 
 const Swatch = ({ colour }: { readonly colour: HexColour | null }): JSX.Element => (
   <span class="swatch" style={{ background: colour ?? 'transparent' }} aria-hidden="true" />
@@ -68,7 +74,7 @@ function Features(): JSX.Element {
                       checked={!hiddenFeatures.value.has(name)}
                       onChange={() => toggleFeature(name)}
                     />
-                    <Swatch colour={PALETTES.light.features[name]} />
+                    <Swatch colour={palette().features[name]} />
                     {FEATURE_NAMES[name]}
                   </label>
                 </th>
@@ -118,8 +124,6 @@ export function Objects(): JSX.Element | null {
   );
 }
 
-const GRADIENT = `linear-gradient(to right, ${RAMP.join(', ')})`;
-
 /** What colours of values are missing for, where they are. */
 function missing(mode: ColourMode): string | null {
   const { found, isWhole } = ranges.value;
@@ -141,7 +145,11 @@ function Scale({ mode }: { readonly mode: ColourMode }): JSX.Element {
   const limits = { unit: '', decimals, hideLabel: true } as const;
   return (
     <div class="scale">
-      <div class="scale-bar" style={{ background: GRADIENT }} aria-hidden="true" />
+      <div
+        class="scale-bar"
+        style={{ background: gradient(RAMPS[isDark.value ? 'dark' : 'light']) }}
+        aria-hidden="true"
+      />
       {(found || own) && (
         <div class="scale-ends">
           <NumberField
@@ -175,12 +183,17 @@ function Scale({ mode }: { readonly mode: ColourMode }): JSX.Element {
   );
 }
 
+/** Those that the file prints with. */
 function Tools(): JSX.Element {
+  const tools = outline.value?.tools ?? [];
+  if (tools.length === 0) return <p class="hint">The file prints nothing.</p>;
   return (
-    <ul class="objects">
-      {[0, 1, 2, 3].map((tool) => (
+    <ul class="objects" aria-label="Tools">
+      {tools.map(({ tool, filament }) => (
         <li key={tool}>
-          <Swatch colour={categoryColour('tool', tool)} />T{tool}
+          <Swatch colour={categoryColour('tool', tool)} />
+          <span class="grow">T{tool}</span>
+          <span class="dim">{formatNumber(filament / 1000, 2)} m</span>
         </li>
       ))}
     </ul>
@@ -189,26 +202,29 @@ function Tools(): JSX.Element {
 
 type Marker = 'showTravel' | 'showWipes' | 'showRetractions' | 'showSeams' | 'showToolChanges' | 'showPauses';
 
-const MARKERS: readonly { readonly key: Marker; readonly name: string }[] = [
-  { key: 'showTravel', name: 'Travel moves' },
-  { key: 'showWipes', name: 'Wipes' },
-  { key: 'showRetractions', name: 'Retractions' },
-  { key: 'showSeams', name: 'Seams' },
-  { key: 'showToolChanges', name: 'Tool changes' },
-  { key: 'showPauses', name: 'Pauses' },
+type MarkerColour = 'travel' | 'wipe' | 'retract' | 'seam' | 'toolChange' | 'pause';
+
+const MARKERS: readonly { readonly key: Marker; readonly name: string; readonly colour: MarkerColour }[] = [
+  { key: 'showTravel', name: 'Travel moves', colour: 'travel' },
+  { key: 'showWipes', name: 'Wipes', colour: 'wipe' },
+  { key: 'showRetractions', name: 'Retractions', colour: 'retract' },
+  { key: 'showSeams', name: 'Seams', colour: 'seam' },
+  { key: 'showToolChanges', name: 'Tool changes', colour: 'toolChange' },
+  { key: 'showPauses', name: 'Pauses', colour: 'pause' },
 ];
 
 function Markers(): JSX.Element {
   return (
     <fieldset class="markers">
       <legend>Also show</legend>
-      {MARKERS.map(({ key, name }) => (
+      {MARKERS.map(({ key, name, colour }) => (
         <label key={key} class="check">
           <input
             type="checkbox"
             checked={settings.value[key]}
             onChange={(event) => change({ [key]: event.currentTarget.checked } as Partial<Settings>)}
           />
+          <Swatch colour={palette()[colour]} />
           {name}
         </label>
       ))}
@@ -255,6 +271,7 @@ export function Legend({ isFlat }: { readonly isFlat: boolean }): JSX.Element | 
           </section>
         )}
         <Markers />
+        {!isFlat && <MeshPart />}
       </div>
     </details>
   );

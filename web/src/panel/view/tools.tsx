@@ -2,6 +2,8 @@
 import type { CameraPreset } from '@stepcast/toolpath';
 import type { JSX } from 'preact';
 import { useState } from 'preact/hooks';
+import { note } from '../../state/log';
+import { notify, withdraw } from '../../state/notices';
 import { file, outline } from '../../state/preview';
 import { change, settings } from '../../state/settings';
 import { pictureOf } from '../../state/view_answers';
@@ -21,6 +23,9 @@ const PRESETS: readonly { readonly preset: CameraPreset; readonly name: string; 
 const PICTURE_WIDTH_PX = 1920;
 const TRIES_MAX = 3;
 
+const NOTICE = 'picture';
+
+/** Saves a picture of the view, or says that there is none. */
 async function savePicture(shape: number): Promise<void> {
   const height = Math.round(PICTURE_WIDTH_PX / Math.min(Math.max(shape, 0.25), 4));
   let blob: Blob | null = null;
@@ -28,7 +33,19 @@ async function savePicture(shape: number): Promise<void> {
   for (let tries = 0; !blob && tries < TRIES_MAX; tries += 1)
     blob = await pictureOf(PICTURE_WIDTH_PX, height);
   const name = (file.peek()?.name ?? 'toolpath').replace(/\.(gcode|gco|g|gz|nc|txt)$/i, '');
-  if (blob) save(blob, `${name}.png`);
+  if (blob) {
+    withdraw(NOTICE);
+    save(blob, `${name}.png`);
+    return;
+  }
+  const text =
+    'The picture could not be made: the view was busy with another file, or the graphics card gave up.';
+  note('error', text);
+  notify({
+    kind: NOTICE,
+    text,
+    action: { text: 'Try again', act: () => void savePicture(shape), why: null },
+  });
 }
 
 interface ToggleProps {
@@ -67,9 +84,10 @@ function Picture(): JSX.Element {
       title="Save a picture of the view as PNG"
       aria-label="Save a picture"
       aria-disabled={isBusy}
+      aria-busy={isBusy}
       onClick={() => void go()}
     >
-      PNG
+      {isBusy ? 'Saving …' : 'PNG'}
     </button>
   );
 }

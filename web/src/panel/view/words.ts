@@ -1,5 +1,9 @@
 // What the 3D view's features and colour modes are called, and their units.
-import type { ColourMode, FeatureName } from '@stepcast/toolpath';
+import type { ColourMode, FeatureName, HexColour } from '@stepcast/toolpath';
+
+/** A ramp of colours as a background, from left to right. */
+export const gradient = (ramp: readonly HexColour[]): string =>
+  `linear-gradient(to right, ${ramp.join(', ')})`;
 
 export const FEATURE_NAMES: Readonly<Record<FeatureName, string>> = {
   innerWall: 'Inner wall',
