@@ -169,12 +169,12 @@ export class ToolpathView {
 
   show(shown: Partial<Shown>): void {
     this.#model.shown = { ...this.#model.shown, ...shown };
-    this.#loop.moved();
+    this.#pathChanged();
   }
 
   setColour(mode: ColourMode): void {
     this.#model.mode = mode;
-    this.#loop.moved();
+    this.#pathChanged();
   }
 
   /** The user's own limits of a mode's colours; null: those found in the file. */
@@ -182,7 +182,7 @@ export class ToolpathView {
     const { [mode]: _, ...others } = this.#model.limits;
     const valid = validRange(mode, range);
     this.#model.limits = valid ? { ...others, [mode]: valid } : others;
-    if (mode === this.#model.mode) this.#loop.moved();
+    if (mode === this.#model.mode) this.#pathChanged();
   }
 
   /** Vertices before this one are printed, the others still to come; null: no difference is shown. */
@@ -222,7 +222,7 @@ export class ToolpathView {
   setHighlightedObject(object: number | null): void {
     if (this.#model.object === object) return;
     this.#model.object = object;
-    this.#loop.moved();
+    this.#pathChanged();
   }
 
   /** What lies outside gets a warning's tint; null: there are no limits. */
@@ -340,6 +340,11 @@ export class ToolpathView {
   #move(camera: CameraState): void {
     this.#model.camera = camera;
     this.#loop.moved();
+  }
+
+  /** Without a file there is nothing to be drawn anew: the first picture of the next one need not wait for that. */
+  #pathChanged(): void {
+    if (this.#model.content) this.#loop.moved();
   }
 
   #followNozzle(): void {
