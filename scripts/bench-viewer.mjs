@@ -291,6 +291,8 @@ async function main(given) {
         results.push(await measure(viewer, urls, file));
       }
       report.push({ file_mb: rounded(statSync(file).size / MB, 1), viewers: results, ratios: ratios(results) });
+      // What is known is not lost if a later one is broken off.
+      process.stderr.write(`${JSON.stringify(report.at(-1))}\n`);
     }
     console.log(JSON.stringify(report, null, 2));
   } finally {
