@@ -112,6 +112,10 @@ export class Drawing implements Painter {
       for (const surface of ['canvas', 'picture'] as const) this.stage.draw(surface, path.scene);
       path.hide();
     }
+    // Out of sight: the picture is cleared before it is begun.
+    this.highlight.set({ from: [0, 0, 0], to: [0, 0, 0], widthMm: 0, heightMm: 0 });
+    this.stage.draw('picture', this.highlight.scene);
+    this.highlight.set(null);
   }
 
   set palette(palette: Palette) {
