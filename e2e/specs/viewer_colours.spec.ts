@@ -124,7 +124,7 @@ test('the choice is kept for the next visit', async ({ panel, page }) => {
   await expect(viewer.colourBy).toHaveValue('width');
 });
 
-/** Beads of two tools, hotter and with the fan on from the second on. */
+/** Three beads: hotter from the second on, with the fan and another tool from the third on. */
 const TWO_TOOLS = `G28
 G90
 M82
@@ -140,8 +140,8 @@ G1 Z0.2 F600
 G1 X90 Y90 F6000
 G1 X110 Y90 E10 F1200
 M104 S230
-M106 S255
 G1 X110 Y110 E20
+M106 S255
 T2
 G1 X90 Y110 E30
 M107

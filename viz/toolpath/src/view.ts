@@ -74,6 +74,8 @@ export class ToolpathView {
   #highlight: VertexIndex | null = null;
   #nozzleMm: Vec3 | null = null;
   #follows = false;
+  /** The camera stands where it was put to see all: then it goes on doing so. */
+  #isFitted = false;
   #grown: Ms = 0;
   #rangesTimer: ReturnType<typeof setTimeout> | null = null;
 
@@ -285,6 +287,7 @@ export class ToolpathView {
     const { camera, content, bedBox } = this.#model;
     const box = content?.store.box() ?? bedBox ?? EMPTY_BOX;
     this.#move(fit({ ...camera, ...direction }, box, this.#drawing.stage.size));
+    this.#isFitted = true;
   }
 
   /** Looks at the whole part from there. */
@@ -293,13 +296,16 @@ export class ToolpathView {
   }
 
   setProjection(projection: Projection): void {
+    const isFitted = this.#isFitted;
     this.#move({ ...this.#model.camera, projection });
+    this.#isFitted = isFitted;
   }
 
   resize({ width, height, ratio }: ViewSizePx): void {
     this.#drawing.smooth = true;
     this.#drawing.stage.resize(width, height, ratio);
-    this.#loop.moved();
+    if (this.#isFitted) this.fit();
+    else this.#loop.moved();
   }
 
   dispose(): void {
@@ -328,6 +334,7 @@ export class ToolpathView {
   };
 
   #move(camera: CameraState): void {
+    this.#isFitted = false;
     this.#model.camera = camera;
     this.#loop.moved();
   }
