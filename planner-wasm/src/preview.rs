@@ -29,15 +29,14 @@ impl Preview {
     pub fn new(printer_cfg: Option<String>) -> Result<Preview, JsError> {
         let config = printer_cfg.map(|text| read_config(&text)).transpose();
         let config = config.map_err(|error| thrown(&error))?;
-        let reader = preview::Preview::new(config.as_ref());
-        let grid = *reader.grid();
-        Ok(Self {
-            reader: Some(reader),
-            origin_mm: grid.origin_mm,
-            step_mm: grid.step_mm,
-            read_bytes: 0,
-            summary: String::new(),
-        })
+        Ok(Self::of(preview::Preview::new(config.as_ref())))
+    }
+
+    /// The same vertices, in a fraction of the time: without what the planner knows, and the summary without times and without
+    /// what the machine cannot do.
+    pub fn outline(printer_cfg: &str) -> Result<Preview, JsError> {
+        let config = read_config(printer_cfg).map_err(|error| thrown(&error))?;
+        Ok(Self::of(preview::Preview::outline(&config)))
     }
 
     /// Where the vertices' step 0, 0, 0 is, in mm.
@@ -85,6 +84,14 @@ impl Preview {
         vertices
     }
 
+    /// Works on what was fed, for the channels and the summary alone: in place of taking vertices.
+    pub fn read_on(&mut self) {
+        if let Some(reader) = &mut self.reader {
+            while reader.run_on() {}
+            self.read_bytes = reader.read_bytes();
+        }
+    }
+
     /// Asks for what the planner knows of each vertex, before the first byte is fed; there is none without a machine.
     pub fn want_channels(&mut self) {
         if let Some(reader) = &mut self.reader {
@@ -128,6 +135,19 @@ impl Preview {
             self.summary = json(&PreviewSummary::of(reader.finish()));
         }
         self.summary.clone()
+    }
+}
+
+impl Preview {
+    fn of(reader: preview::Preview) -> Self {
+        let grid = *reader.grid();
+        Self {
+            reader: Some(reader),
+            origin_mm: grid.origin_mm,
+            step_mm: grid.step_mm,
+            read_bytes: 0,
+            summary: String::new(),
+        }
     }
 }
 

@@ -126,6 +126,11 @@ impl Checker {
         }
     }
 
+    /// Reads as [`Self::new`] does, but judges no moves: for whoever wants to know quickly where they lead.
+    pub(crate) fn reader(config: &PrinterConfig) -> Self {
+        Self { guard: None, speeds: None, ..Self::new(Some(config)) }
+    }
+
     /// Pictures are among the actions that [`Self::feed_with`] shows.
     pub fn show_pictures(&mut self) {
         self.interpreter.show_pictures();
@@ -303,11 +308,11 @@ impl Checker {
     }
 
     fn home(&mut self, axes: [bool; 3]) {
-        let axes = self.config.as_ref().map_or(axes, |config| machine::homed_together(config, axes));
-        let endstops = self
-            .config
-            .as_ref()
-            .map_or([0.0; 3], |config| config.steppers.each_ref().map(|stepper| stepper.position_endstop.0));
+        let of = |config: &PrinterConfig| {
+            let endstops = config.steppers.each_ref().map(|stepper| stepper.position_endstop.0);
+            (machine::homed_together(config, axes), endstops)
+        };
+        let (axes, endstops) = self.config.as_ref().map_or((axes, [0.0; 3]), of);
         for axis in (0..3).filter(|&axis| axes[axis]) {
             if let Some(guard) = &mut self.guard {
                 guard.set_homed(axis, true);
@@ -320,11 +325,10 @@ impl Checker {
     fn limits_of(&mut self, heater: Heater, line: LineNumber) -> Option<HeaterConfig> {
         let config = self.config.as_ref()?;
         let limits = match heater {
-            Heater::Tool(0) => config.extruder.as_ref().map(|extruder| &extruder.heater),
-            Heater::Bed => config.heater_bed.as_ref(),
+            Heater::Tool(0) => config.extruder.as_ref().map(|extruder| extruder.heater.clone()),
+            Heater::Bed => config.heater_bed.clone(),
             _ => None,
         };
-        let limits = limits.cloned();
         if limits.is_none() {
             let detail = format!("{} is not in the machine file", machine::heater_name(heater));
             self.error(ErrorCode::NoSuchHeater, detail, Some(line.0));

@@ -70,6 +70,11 @@ function reset(theme: 'light' | 'dark'): void {
   host.setColourRange('speed', null);
   host.setProjection('perspective');
   host.show({
+    layerFrom: 0,
+    layerTo: Number.MAX_SAFE_INTEGER,
+    vertexFrom: null,
+    vertexTo: null,
+    hiddenObjects: [],
     travel: false,
     wipes: false,
     retractions: false,

@@ -123,6 +123,13 @@ export interface Ray {
 export const pixelAngle = (camera: CameraState, size: ViewSize): number =>
   mmPerPx(camera, size) / eyeDistanceMm(camera);
 
+/** Whether both show the same. */
+export function isSameCamera(one: CameraState, other: CameraState): boolean {
+  const { targetMm: to, ...rest } = other;
+  const names = Object.keys(rest) as (keyof typeof rest)[];
+  return names.every((name) => one[name] === rest[name]) && one.targetMm.every((mm, axis) => mm === to[axis]);
+}
+
 /** The line of sight through a point of the view, from its left top. */
 export function rayThrough(camera: CameraState, size: ViewSize, x: CssPx, y: CssPx): Ray {
   const { eyeMm, right, up, forward } = eyeFrame(camera);

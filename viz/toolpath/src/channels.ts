@@ -1,7 +1,7 @@
 /**
  * The bit layout of the planner's channels: four u32 words a vertex, one RGBA32UI texel (docs/vertex.md, "Planner channels").
  *
- * Does: packing and unpacking, and one texel for several segments. Does not know: where they come from, how they are
+ * Does: packing and unpacking. Does not know: where they come from, how they are
  * drawn. Units: mm/s, mm/s², mm³/s, °C, percent, s.
  */
 
@@ -57,48 +57,4 @@ export function encodeChannels(words: Uint32Array, index: number, input: Partial
     words[at] = (words[at] ?? 0) | place(name, input[name] ?? 0);
   }
   new Float32Array(words.buffer, words.byteOffset + (base + 3) * 4, 1)[0] = input.timeS ?? 0;
-}
-
-/** Several segments as one: times add up, peaks stay, averages are by time, what is set is as at the end. */
-export class ChannelSum {
-  #peak = 0;
-  #accel = 0;
-  #speedTime = 0;
-  #flowTime = 0;
-  #time = 0;
-  #newestDynamics = 0;
-  #newestSet = 0;
-  readonly #float = new Float32Array(1);
-  readonly #bits = new Uint32Array(this.#float.buffer);
-
-  add(words: Uint32Array, base: number): void {
-    const [speeds, dynamics, set] = [words[base] ?? 0, words[base + 1] ?? 0, words[base + 2] ?? 0];
-    this.#bits[0] = words[base + 3] ?? 0;
-    this.#newestDynamics = dynamics;
-    this.#newestSet = set;
-    const time = this.#float[0] ?? 0;
-    if (!(time > 0 && time < Infinity)) return;
-    this.#time += time;
-    this.#speedTime += time * (speeds >>> 16);
-    this.#flowTime += time * (set & 0xffff);
-    this.#peak = Math.max(this.#peak, speeds & 0xffff);
-    this.#accel = Math.max(this.#accel, dynamics & 0xffff);
-  }
-
-  /** Writes the sum's four words and begins anew. */
-  take(out: Uint32Array, base: number): void {
-    const time = Math.max(this.#time, Number.MIN_VALUE);
-    out[base] = this.#peak | (Math.round(this.#speedTime / time) << 16);
-    out[base + 1] = this.#accel | (this.#newestDynamics & 0xffff_0000);
-    out[base + 2] = Math.round(this.#flowTime / time) | (this.#newestSet & 0xffff_0000);
-    this.#float[0] = this.#time;
-    out[base + 3] = this.#bits[0] ?? 0;
-    this.#peak = 0;
-    this.#accel = 0;
-    this.#speedTime = 0;
-    this.#flowTime = 0;
-    this.#time = 0;
-    this.#newestDynamics = 0;
-    this.#newestSet = 0;
-  }
 }

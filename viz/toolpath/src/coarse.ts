@@ -1,150 +1,137 @@
 /**
- * A coarser path for pictures in motion: runs of short segments become one, within a tolerance.
+ * A coarser path for pictures in motion: runs of short segments become one, within a tolerance. Outer walls are listed apart from
+ * the rest, so that they can be drawn first.
  *
- * Does: takes vertices as they come, in any pieces, and hands out those that are kept, in the same layout, with their
- * indices in the file. A run ends where feature, layer, width or height change, at travels and at markers. The tolerance is kept with a
- * wedge of directions from the run's first vertex (Williams 1978, Sklansky and Gonzalez 1980), so each vertex is
- * looked at once. Does not know: drawing. Units: steps of the header; the tolerance in mm.
+ * Does: takes vertices as they come, in any pieces, and lists segments from vertex to vertex of the full path. A run ends where
+ * feature, layer, width or height change, at what is not laid, and where a chunk of vertices ends. The tolerance is kept with a
+ * wedge of directions from the run's first vertex (Williams 1978, Sklansky and Gonzalez 1980), so each vertex is looked at
+ * once. Does not know: drawing. Units: steps of the header; the tolerance in mm.
  */
-import { ChannelSum } from './channels';
-import { LEAD_TEXELS, TexelStore, VertexStore } from './chunks';
+import { LEAD_TEXELS, VERTICES_PER_CHUNK } from './chunks';
 import { LayerList, type ReducedDetail, type VertexRange } from './layers';
-import type { Mm, VertexIndex } from './units';
-import { FLAGS, type VertexHeader, WORDS_PER_VERTEX } from './vertex';
+import { SegmentList } from './segments';
+import type { Mm } from './units';
+import { FIELDS, FLAGS, featureNumber, type VertexHeader, WORDS_PER_VERTEX } from './vertex';
 
 /** How far a left-out vertex may lie beside the coarse path: less than a bead's width. */
 export const TOLERANCE_MM: Mm = 0.15;
-/** A run may climb so much (a vase's spiral) before a vertex is kept. */
+/** A run may climb so much (a vase's spiral) before it ends. */
 const CLIMB_MAX_MM: Mm = 0.05;
 /** A run has at most so many segments, so that the printed part is told apart finely enough. */
 const RUN_MAX = 256;
 
 const POSITION = 0xf_ffff;
-const SIZE_AND_REST = ~POSITION >>> 0;
-const NEW_RUN = FLAGS.travel | FLAGS.break | FLAGS.retract | FLAGS.unretract;
+const SIZE = ~POSITION;
+const FEATURE = ((1 << FIELDS.feature.bits) - 1) << FIELDS.feature.shift;
+const NOT_LAID = FLAGS.travel | FLAGS.break;
+const OUTER_WALLS = (1 << featureNumber('outerWall')) | (1 << featureNumber('overhangWall'));
 
 export class Coarsener {
+  readonly #take: (isOuter: boolean, chunk: number, fromTexel: number, toTexel: number) => void;
   readonly #tolerance: number;
   readonly #climb: number;
-  /** The file's index of each kept vertex. */
-  #kept = new Uint32Array(1024);
-  #count = 0;
   /** Vertices seen. */
   #seen = 0;
+  /** The last of them. */
   readonly #last = new Uint32Array(WORDS_PER_VERTEX);
+  /** Segments of the run that is open; 0: none is. */
   #run = 0;
-  #anchor: readonly [number, number, number] = [0, 0, 0];
-  /** Directions from the anchor that pass all vertices left out: from `#low` to `#high` around `#middle`, in radians. */
+  /** The vertex where it begins. */
+  #first = 0;
+  #anchorX = 0;
+  #anchorY = 0;
+  #anchorZ = 0;
+  /** Directions from there that pass all vertices left out: from `#low` to `#high` around `#middle`, in radians. */
   #middle = 0;
   #low = 0;
   #high = 0;
   #reach = 0;
 
-  constructor(header: VertexHeader) {
+  constructor(
+    header: VertexHeader,
+    take: (isOuter: boolean, chunk: number, fromTexel: number, toTexel: number) => void,
+  ) {
+    this.#take = take;
     this.#tolerance = TOLERANCE_MM / header.stepMm;
     this.#climb = CLIMB_MAX_MM / header.stepMm;
   }
 
-  get count(): number {
-    return this.#count;
-  }
-
-  /** The coarse index of the first kept vertex at or behind a vertex of the file. */
-  coarseOf(vertex: VertexIndex): number {
-    let [low, high] = [0, this.#count];
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if ((this.#kept[middle] ?? 0) < vertex) low = middle + 1;
-      else high = middle;
-    }
-    return low;
-  }
-
-  /** The file's index of a kept vertex; null for one that is not known yet. */
-  fileIndex(kept: number): VertexIndex | null {
-    return kept < this.#count ? (this.#kept[kept] ?? null) : null;
-  }
-
-  /** The kept ones of these vertices and of the one held back before; the last one is held back. */
-  push(words: Uint32Array): Uint32Array {
-    const total = Math.floor(words.length / WORDS_PER_VERTEX);
-    const out = new Uint32Array((total + 1) * WORDS_PER_VERTEX);
-    let filled = 0;
-    for (let vertex = 0; vertex < total; vertex++) {
-      const base = vertex * WORDS_PER_VERTEX;
-      if (this.#seen > 0 && !this.#passes(words, base)) {
-        out.set(this.#last, filled);
-        filled += WORDS_PER_VERTEX;
-        this.#keepLast();
-        // The wedge of the new run begins with this vertex.
-        this.#passes(words, base);
-      }
-      for (let word = 0; word < WORDS_PER_VERTEX; word++) this.#last[word] = words[base + word] ?? 0;
+  push(words: Uint32Array): void {
+    const last = this.#last;
+    const end = words.length - (words.length % WORDS_PER_VERTEX);
+    for (let base = 0; base < end; base += WORDS_PER_VERTEX) {
+      const x = words[base] ?? 0;
+      const y = words[base + 1] ?? 0;
+      const z = words[base + 2] ?? 0;
+      const rest = words[base + 3] ?? 0;
+      const opensChunk = this.#seen % VERTICES_PER_CHUNK === 0;
+      if (this.#run > 0 && (opensChunk || !this.#goesOn(x, y, z, rest))) this.#close();
+      // Without a vertex before it there is no segment.
+      if (this.#run === 0 && (z & NOT_LAID) === 0 && this.#seen > 0) this.#open(x, y);
+      last[0] = x;
+      last[1] = y;
+      last[2] = z;
+      last[3] = rest;
       this.#seen += 1;
     }
-    return out.subarray(0, filled);
   }
 
-  /** The vertex held back. */
-  finish(): Uint32Array {
-    if (this.#seen === 0 || (this.#count > 0 && this.#kept[this.#count - 1] === this.#seen - 1)) {
-      return new Uint32Array(0);
-    }
-    this.#keepLast();
-    return this.#last.slice();
+  /** No more vertices come. */
+  finish(): void {
+    if (this.#run > 0) this.#close();
   }
 
-  /** Notes the vertex held back as kept; a new run begins there. */
-  #keepLast(): void {
-    if (this.#count === this.#kept.length) {
-      const grown = new Uint32Array(this.#kept.length * 2);
-      grown.set(this.#kept);
-      this.#kept = grown;
-    }
-    this.#kept[this.#count++] = this.#seen - 1;
-    const [x = 0, y = 0, z = 0] = this.#last;
-    this.#anchor = [x & POSITION, y & POSITION, z & POSITION];
+  /** A run begins at the last vertex; its first segment ends at x, y. */
+  #open(x: number, y: number): void {
+    this.#first = this.#seen - 1;
+    this.#anchorX = (this.#last[0] ?? 0) & POSITION;
+    this.#anchorY = (this.#last[1] ?? 0) & POSITION;
+    this.#anchorZ = (this.#last[2] ?? 0) & POSITION;
+    const dx = (x & POSITION) - this.#anchorX;
+    const dy = (y & POSITION) - this.#anchorY;
+    const distance = Math.sqrt(dx * dx + dy * dy);
+    const half = this.#halfAngle(distance);
+    this.#middle = Math.atan2(dy, dx);
+    this.#low = -half;
+    this.#high = half;
+    this.#reach = distance;
+    this.#run = 1;
+  }
+
+  /** The run ends at the last vertex. */
+  #close(): void {
+    const to = this.#seen - 1;
+    const chunk = Math.floor(to / VERTICES_PER_CHUNK);
+    const before = LEAD_TEXELS - chunk * VERTICES_PER_CHUNK;
+    const isOuter = ((OUTER_WALLS >>> (((this.#last[2] ?? 0) & FEATURE) >>> FIELDS.feature.shift)) & 1) === 1;
+    this.#take(isOuter, chunk, this.#first + before, to + before);
     this.#run = 0;
-    this.#reach = 0;
   }
 
-  /** True if the vertex held back may be left out, now that the one at `base` follows; narrows the wedge. */
-  #passes(words: Uint32Array, base: number): boolean {
-    const [lastX = 0, lastY = 0, lastZ = 0, lastRest = 0] = this.#last;
-    const [x, y, z] = [words[base] ?? 0, words[base + 1] ?? 0, words[base + 2] ?? 0];
-    const first = this.#run === 0 && this.#count > 0;
-    if (!first) {
-      const same =
-        ((lastX ^ x) & SIZE_AND_REST) === 0 &&
-        ((lastY ^ y) & SIZE_AND_REST) === 0 &&
-        ((lastZ ^ z) & SIZE_AND_REST) === 0 &&
-        lastRest === words[base + 3];
-      if (!same || (z & NEW_RUN) !== 0 || this.#run >= RUN_MAX || this.#count === 0) return false;
-    }
-    const dx = (x & POSITION) - this.#anchor[0];
-    const dy = (y & POSITION) - this.#anchor[1];
-    const distance = Math.hypot(dx, dy);
-    const climbed = Math.abs((z & POSITION) - this.#anchor[2]) > this.#climb;
-    if (!first && (climbed || distance < this.#reach)) return false;
-    return this.#narrow(dx, dy, distance, first);
-  }
-
-  #narrow(dx: number, dy: number, distance: number, first: boolean): boolean {
-    const half = distance > this.#tolerance ? Math.asin(this.#tolerance / distance) : Math.PI;
-    const angle = Math.atan2(dy, dx);
-    if (first) {
-      this.#middle = angle;
-      this.#low = -half;
-      this.#high = half;
-    } else {
-      const turn = wrapped(angle - this.#middle);
-      if (turn < this.#low || turn > this.#high) return false;
-      this.#low = Math.max(this.#low, turn - half);
-      this.#high = Math.min(this.#high, turn + half);
-    }
+  /** True if the last vertex may be left out, now that this one follows; narrows the wedge. */
+  #goesOn(x: number, y: number, z: number, rest: number): boolean {
+    const last = this.#last;
+    if ((z & NOT_LAID) !== 0 || this.#run >= RUN_MAX) return false;
+    if ((((last[0] ?? 0) ^ x) & SIZE) !== 0 || (((last[1] ?? 0) ^ y) & SIZE) !== 0) return false;
+    if ((((last[2] ?? 0) ^ z) & FEATURE) !== 0 || last[3] !== rest) return false;
+    const dx = (x & POSITION) - this.#anchorX;
+    const dy = (y & POSITION) - this.#anchorY;
+    const distance = Math.sqrt(dx * dx + dy * dy);
+    // Back on the same way, or too steep.
+    if (distance < this.#reach || Math.abs((z & POSITION) - this.#anchorZ) > this.#climb) return false;
+    const turn = wrapped(Math.atan2(dy, dx) - this.#middle);
+    if (turn < this.#low || turn > this.#high) return false;
+    const half = this.#halfAngle(distance);
+    this.#low = Math.max(this.#low, turn - half);
+    this.#high = Math.min(this.#high, turn + half);
     this.#run += 1;
     this.#reach = distance;
     return true;
+  }
+
+  /** How far a direction may turn before a place at this distance is passed beside. */
+  #halfAngle(distance: number): number {
+    return distance > this.#tolerance ? Math.asin(this.#tolerance / distance) : Math.PI;
   }
 }
 
@@ -154,65 +141,62 @@ function wrapped(angle: number): number {
   return angle < -Math.PI ? angle + 2 * Math.PI : angle;
 }
 
+/** Of the segments' budget, what outer walls may take at most where there is more to draw. */
+const OUTER_SHARE = 0.65;
+
 /** The coarse path of a file, beside the full one. */
 export class Rough {
-  readonly store: VertexStore;
-  /** Of the kept vertices. */
-  readonly channels = new TexelStore(0);
+  /** The outer walls. */
+  readonly outer = new RoughList();
+  /** All the rest. */
+  readonly inner = new RoughList();
   readonly #coarsener: Coarsener;
-  readonly #sum = new ChannelSum();
-  readonly #taken = new Uint32Array(WORDS_PER_VERTEX);
-  /** The file's vertex whose channels are taken next. */
-  #nextChannels = 0;
+
+  constructor(header: VertexHeader) {
+    this.#coarsener = new Coarsener(header, (isOuter, chunk, from, to) => {
+      (isOuter ? this.outer : this.inner).segments.push(chunk, from, to);
+    });
+  }
+
+  append(words: Uint32Array): void {
+    this.#coarsener.push(words);
+  }
+
+  end(): void {
+    this.#coarsener.finish();
+  }
+
+  /** How many segments of the lists to draw of a budget: outer walls come first. */
+  shares(ranges: readonly VertexRange[], budget: number): readonly [outer: number, inner: number] {
+    const outer = this.outer.total(ranges);
+    const inner = this.inner.total(ranges);
+    const forOuter = Math.min(outer, Math.max(budget * OUTER_SHARE, budget - inner));
+    return [forOuter, Math.min(inner, budget - forOuter)];
+  }
+}
+
+/** Segments of one kind. */
+export class RoughList {
+  readonly segments = new SegmentList();
   #layers = new LayerList();
   /** What `#layers` was made from. */
   #from: { readonly layers: LayerList; readonly count: number } | null = null;
 
-  constructor(header: VertexHeader) {
-    this.store = new VertexStore(header);
-    this.#coarsener = new Coarsener(header);
+  /** Segments that end in these ranges of vertices. */
+  total(ranges: readonly VertexRange[]): number {
+    return ranges.reduce((sum, range) => {
+      const { first, end } = this.segments.within(range);
+      return sum + end - first;
+    }, 0);
   }
 
-  append(words: Uint32Array): void {
-    this.store.append(this.#coarsener.push(words));
-  }
-
-  end(): void {
-    this.store.append(this.#coarsener.finish());
-  }
-
-  /** Takes the channels of all vertices of which it is known whether they are kept; each is looked at once. */
-  takeChannels(channels: TexelStore): void {
-    let kept = this.channels.count;
-    const last = this.#coarsener.fileIndex(this.#coarsener.count - 1);
-    if (last === null) return;
-    const parts = channels.split({ first: this.#nextChannels, end: last + 1 });
-    for (const { chunk, first, count } of parts) {
-      const out: number[] = [];
-      for (let at = first; at < first + count; at++) {
-        this.#sum.add(chunk.data, (LEAD_TEXELS + at) * WORDS_PER_VERTEX);
-        if (this.#coarsener.fileIndex(kept) !== chunk.firstVertex + at) continue;
-        this.#sum.take(this.#taken, 0);
-        out.push(...this.#taken);
-        kept += 1;
-      }
-      this.channels.append(Uint32Array.from(out));
-      this.#nextChannels = chunk.firstVertex + first + count;
-    }
-  }
-
-  coarseOf(vertex: VertexIndex): number {
-    return this.#coarsener.coarseOf(vertex);
-  }
-
-  /** What to draw of a range of the full path with about so many segments; the ranges are coarse. */
+  /** What to draw of a range of vertices with about so many segments; the ranges are of entries. */
   reduced(range: VertexRange, layers: LayerList, budget: number): ReducedDetail {
-    const count = this.store.count;
+    const { count } = this.segments;
     if (this.#from?.layers !== layers || this.#from.count !== count) {
-      this.#layers = layers.mapped((vertex) => this.coarseOf(vertex));
+      this.#layers = layers.mapped((vertex) => this.segments.entryAt(vertex));
       this.#from = { layers, count };
     }
-    const coarse = { first: this.coarseOf(range.first), end: Math.min(this.coarseOf(range.end), count) };
-    return this.#layers.reduced(coarse, budget);
+    return this.#layers.reduced(this.segments.within(range), budget);
   }
 }

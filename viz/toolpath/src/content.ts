@@ -41,7 +41,6 @@ export class Content {
 
   appendChannels(words: Uint32Array): void {
     this.channels.append(words);
-    this.rough.takeChannels(this.channels);
     this.#findRanges();
   }
 
@@ -49,7 +48,6 @@ export class Content {
   end(): void {
     this.#ended = true;
     this.rough.end();
-    this.rough.takeChannels(this.channels);
     this.#findRanges();
   }
 

@@ -53,3 +53,36 @@ export class DetailBudget {
     this.#budget = Math.round(Math.max(wanted, SEGMENTS_MIN));
   }
 }
+
+/** A full picture that takes longer does without several samples a pixel. */
+const SMOOTH_MAX_MS: Ms = 1500;
+/** Fewer segments never take long, whatever else the machine does. */
+const SMOOTH_ALWAYS = 30_000;
+/** Four samples a pixel make a picture at most so many times as dear. */
+const SMOOTH_COST_MAX = 3;
+
+/** Whether full pictures are drawn with several samples a pixel: as long as that is no nuisance, by the pictures before. */
+export class SmoothChoice {
+  #smoothMs: Ms = 0;
+  #plainMs: Ms = Infinity;
+
+  /** Whether the next picture, of so many segments, is worth it. */
+  isWorth(segments: number): boolean {
+    if (segments <= SMOOTH_ALWAYS) return true;
+    // One picture that took long for another reason is put right by the next one, which is plain.
+    return Math.min(this.#smoothMs, SMOOTH_COST_MAX * this.#plainMs) * segments <= SMOOTH_MAX_MS;
+  }
+
+  /** A picture of so many segments took so long. */
+  measured(isSmooth: boolean, segments: number, elapsedMs: Ms): void {
+    if (!(elapsedMs >= 0) || !(segments >= SEGMENTS_FEW)) return;
+    if (isSmooth) this.#smoothMs = elapsedMs / segments;
+    else this.#plainMs = elapsedMs / segments;
+  }
+
+  /** Pictures of another size: what was measured holds no longer. */
+  reset(): void {
+    this.#smoothMs = 0;
+    this.#plainMs = Infinity;
+  }
+}

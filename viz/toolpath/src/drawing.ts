@@ -7,19 +7,23 @@
 import { Scene } from 'three';
 import { BedObjects } from './bed';
 import { type BoxMm, type CameraState, pixelAngle, unionOf, type ViewSize } from './camera';
+import type { RoughList } from './coarse';
 import type { ColourMode, ColourRanges } from './colours';
 import type { Content } from './content';
+import { SmoothChoice } from './detail';
 import type { Drawn, Painter } from './frames';
 import { HighlightObject } from './highlight';
 import { LayerTimes } from './layer_times';
 import { cut, lengthOf, type VertexRange } from './layers';
 import { NozzleObject } from './nozzle';
 import { featureMask, type Palette } from './palette';
-import { PathObjects } from './path';
+import { beadsOf, listedBeadsOf, PathObjects } from './path';
 import { ALL_PRINTED } from './path_uniforms';
 import { type Shown, shownRanges } from './shown';
 import { Stage, type Surface } from './stage';
 import { SurfaceObject } from './surface';
+import { PathTextures } from './textures';
+import type { Ms } from './units';
 import { FLAGS } from './vertex';
 
 export const EMPTY_BOX: BoxMm = { min: [-50, -50, 0], max: [50, 50, 50] };
@@ -61,12 +65,17 @@ export class Drawing implements Painter {
   readonly nozzle = new NozzleObject();
   readonly highlight = new HighlightObject();
   readonly layerTimes = new LayerTimes();
-  /** Draw several samples a pixel. */
-  smooth = true;
+  /** Whether the full picture has several samples a pixel. */
+  readonly smooth = new SmoothChoice();
   readonly #model: Readonly<Model>;
-  readonly #fine = new PathObjects('whole');
-  /** For pictures in motion. */
-  readonly #coarse = new PathObjects('body');
+  readonly #textures = new PathTextures();
+  readonly #fine = new PathObjects('whole', this.#textures);
+  /** For pictures in motion: outer walls, and all the rest. */
+  readonly #coarse = {
+    outer: new PathObjects('listed', this.#textures),
+    inner: new PathObjects('listed', this.#textures),
+  };
+  readonly #paths = [this.#fine, this.#coarse.outer, this.#coarse.inner];
   readonly #bedScene = new Scene();
   #progress: Progress | null = null;
   readonly #onStale: () => void;
@@ -82,7 +91,7 @@ export class Drawing implements Painter {
 
   /** Has the shaders compiled before they are needed: the first picture of a file need not wait for them. */
   warmUp(): void {
-    for (const path of [this.#coarse, this.#fine]) {
+    for (const path of this.#paths) {
       path.showNothing();
       for (const surface of ['canvas', 'picture'] as const) this.stage.draw(surface, path.scene);
       path.hide();
@@ -90,7 +99,7 @@ export class Drawing implements Painter {
   }
 
   set palette(palette: Palette) {
-    for (const path of [this.#fine, this.#coarse]) path.uniforms.palette = palette;
+    for (const path of this.#paths) path.uniforms.palette = palette;
     this.bed.palette = palette;
     this.surface.palette = palette;
     this.highlight.palette = palette;
@@ -100,16 +109,16 @@ export class Drawing implements Painter {
 
   /** A file's chunks go. */
   empty(): void {
-    this.#fine.clear();
-    this.#coarse.clear();
+    for (const path of this.#paths) path.clear();
+    this.#textures.clear();
     this.layerTimes.clear();
     this.#progress = null;
   }
 
   /** The context is lost: what was on the GPU is gone; what belongs to it here goes too and comes anew from the model. */
   lost(): void {
-    this.#fine.release();
-    this.#coarse.release();
+    for (const path of this.#paths) path.release();
+    this.#textures.clear();
     this.layerTimes.clear();
     this.bed.clear();
     this.surface.release();
@@ -121,8 +130,7 @@ export class Drawing implements Painter {
 
   dispose(): void {
     this.empty();
-    this.#fine.release();
-    this.#coarse.release();
+    for (const path of this.#paths) path.release();
     this.bed.clear();
     this.surface.clear();
     this.nozzle.release();
@@ -145,7 +153,7 @@ export class Drawing implements Painter {
 
   drawSlice(budget: number, restart: boolean): Drawn {
     if (restart || !this.#progress) {
-      this.stage.smooth = this.smooth;
+      this.stage.smooth = this.smooth.isWorth(this.fullSegments());
       this.#progress = this.begin('picture', this.#model.camera, this.stage.size, this.stage.ratio);
     }
     const progress = this.#progress;
@@ -153,6 +161,11 @@ export class Drawing implements Painter {
     if (drawn.complete) this.overlay();
     if (drawn.complete && progress.printed !== this.#model.printed) this.#onStale();
     return drawn;
+  }
+
+  /** The full picture of so many segments took so long. */
+  measured(segments: number, elapsedMs: Ms): void {
+    this.smooth.measured(this.stage.smooth, segments, elapsedMs);
   }
 
   /** Draws what was printed since the full picture over it: same places, same depths, other colours. */
@@ -227,7 +240,7 @@ export class Drawing implements Painter {
     const box = unionOf(unionOf(bedBox, content?.store.boxOfPlaces() ?? null), this.surface.box);
     this.stage.look(camera, box ?? EMPTY_BOX, size);
     const angle = pixelAngle(camera, size);
-    for (const { uniforms } of [this.#fine, this.#coarse]) uniforms.setPixels(angle / ratio, ratio);
+    for (const { uniforms } of this.#paths) uniforms.setPixels(angle / ratio, ratio);
     this.nozzle.pixelAngle = angle;
     this.highlight.view = size;
   }
@@ -260,7 +273,7 @@ export class Drawing implements Painter {
   #beads(surface: Surface, range: VertexRange): void {
     const parts = this.#model.content?.store.split(range) ?? [];
     if (parts.length === 0) return;
-    this.#fine.showBeads(parts.map((part) => ({ range: part, stride: 1 })));
+    this.#fine.showBeads(parts.map(beadsOf));
     this.stage.draw(surface, this.#fine.scene);
   }
 
@@ -289,29 +302,38 @@ export class Drawing implements Painter {
   }
 
   #drawRough(budget: number): number {
-    const { content, printed } = this.#model;
+    const { content } = this.#model;
     if (!content) return 0;
     const { rough } = content;
     const ranges = this.ranges();
-    const total = lengthOf(ranges);
-    this.#coarse.sync(rough.store.chunks, rough.channels.chunks);
-    this.#apply(this.#coarse);
-    this.#coarse.uniforms.printed = printed === ALL_PRINTED ? ALL_PRINTED : rough.coarseOf(printed);
-    let segments = 0;
-    for (const range of ranges) {
-      const share = (budget * (range.end - range.first)) / Math.max(total, 1);
-      const reduced = rough.reduced(range, content.layers, Math.max(share, 1));
-      const parts = reduced.ranges.flatMap((part) => rough.store.split(part));
-      if (parts.length === 0) continue;
-      this.#coarse.uniforms.heightScale = reduced.layerStep;
-      this.#coarse.showBeads(parts.map((part) => ({ range: part, stride: reduced.stride })));
-      this.stage.draw('canvas', this.#coarse.scene);
-      segments += lengthOf(reduced.ranges) / reduced.stride;
-    }
-    if (this.#linesShown() && total < budget) {
+    const [forOuter, forInner] = rough.shares(ranges, budget);
+    let segments = this.#drawListed(this.#coarse.outer, rough.outer, ranges, forOuter);
+    segments += this.#drawListed(this.#coarse.inner, rough.inner, ranges, forInner);
+    if (this.#linesShown() && lengthOf(ranges) < budget) {
       this.#fine.sync(content.store.chunks, content.channels.chunks);
       this.#apply(this.#fine);
       for (const range of ranges) this.#lines('canvas', range);
+    }
+    return segments;
+  }
+  /** Draws about so many segments of a list; returns how many. */
+  #drawListed(path: PathObjects, list: RoughList, ranges: readonly VertexRange[], budget: number): number {
+    const { content, printed } = this.#model;
+    const total = list.total(ranges);
+    if (!content || total === 0 || budget < 1) return 0;
+    path.sync(content.store.chunks, content.channels.chunks, list.segments);
+    this.#apply(path);
+    path.uniforms.printed = printed;
+    let segments = 0;
+    for (const range of ranges) {
+      const share = (budget * list.total([range])) / total;
+      const reduced = list.reduced(range, content.layers, Math.max(share, 1));
+      const parts = reduced.ranges.flatMap((part) => list.segments.split(part));
+      if (parts.length === 0) continue;
+      path.uniforms.heightScale = reduced.layerStep;
+      path.showBeads(parts.map(listedBeadsOf), reduced.stride);
+      this.stage.draw('canvas', path.scene);
+      segments += Math.round(lengthOf(reduced.ranges) / reduced.stride);
     }
     return segments;
   }

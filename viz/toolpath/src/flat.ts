@@ -97,13 +97,6 @@ export class FlatView implements View {
   begin(header: VertexHeader): void {
     this.#store = new VertexStore(header);
     this.#layers = new LayerList();
-    this.#shown = {
-      ...this.#shown,
-      layerFrom: 0,
-      layerTo: SHOW_ALL.layerTo,
-      vertexFrom: null,
-      vertexTo: null,
-    };
     this.#restart();
   }
 

@@ -52,6 +52,8 @@ export interface FrameReport {
 
 /** After the last movement, until the full picture is begun. */
 const REST_MS = 140;
+/** The same after more of a file has come. */
+const GROWTH_REST_MS = 1500;
 const POLL_MS = 2;
 /** A GPU that is silent for so long has lost its context or is stuck: the loop goes on. */
 const FENCE_MAX_MS = 10_000;
@@ -89,6 +91,15 @@ export class FrameLoop {
 
   /** Something that moves has changed the picture. */
   moved(): void {
+    this.#changed(REST_MS);
+  }
+
+  /** The file has grown, and will again: a full picture is not begun between. */
+  grew(): void {
+    this.#changed(GROWTH_REST_MS);
+  }
+
+  #changed(restMs: Ms): void {
     if (this.#fullFits()) {
       this.redraw();
       return;
@@ -102,7 +113,7 @@ export class FrameLoop {
       this.#timer = null;
       this.#fullWanted = true;
       this.#schedule();
-    }, REST_MS);
+    }, restMs);
   }
 
   /** The picture is to be drawn anew; the old one stays until then. */

@@ -83,6 +83,8 @@ export type ViewEvent =
   | { readonly type: 'frame'; readonly report: FrameReport }
   /** What was found up to now, a few times a second while data come; `isWhole`: nothing is missing any more. */
   | { readonly type: 'ranges'; readonly ranges: ColourRanges; readonly isWhole: boolean }
+  /** All vertices of the file are there. */
+  | { readonly type: 'built'; readonly vertices: number }
   | { readonly type: 'picked'; readonly id: number; readonly vertex: VertexIndex | null }
   /** A PNG; null where none could be made. */
   | { readonly type: 'picture'; readonly id: number; readonly blob: Blob | null }

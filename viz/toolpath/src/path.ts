@@ -1,27 +1,24 @@
 /**
- * The toolpath as three.js objects: for each chunk of vertices one texture and a mesh of beads, lines of travels and
- * points of markers that pull from it.
+ * The toolpath as three.js objects: for each chunk of vertices a mesh of beads, lines of travels and points of markers that pull
+ * from its textures.
  *
- * Does: uploads, uniforms, and which ranges the next rendering draws. Does not know: camera, frames, when to draw.
+ * Does: objects, uniforms, and which ranges the next rendering draws. Does not know: camera, frames, when to draw.
  */
 import {
   BufferAttribute,
   BufferGeometry,
-  DataTexture,
   DoubleSide,
   GLSL3,
   LineSegments,
   Mesh,
-  NearestFilter,
   type Object3D,
   Points,
   RawShaderMaterial,
-  RGBAIntegerFormat,
   Scene,
-  UnsignedIntType,
 } from 'three';
-import { type Chunk, type ChunkRange, TEXELS_PER_ROW, VERTICES_PER_CHUNK } from './chunks';
+import { type Chunk, type ChunkRange, VERTICES_PER_CHUNK } from './chunks';
 import { PathUniforms, type Uniforms } from './path_uniforms';
+import type { SegmentList, SegmentRange } from './segments';
 import {
   BEAD_FRAGMENT,
   BEAD_VERTEX,
@@ -31,117 +28,113 @@ import {
   POINTS_PER_BEAD,
   TRAVEL_VERTEX,
 } from './shaders';
-import { WORDS_PER_VERTEX } from './vertex';
+import { ListTextures, NO_SEGMENTS, NO_TEXELS, type PathTextures } from './textures';
 
 /** Two strips of the facing half: left outline to nearest point, nearest point to right outline. */
 const BODY = [0, 5, 1, 1, 5, 6, 1, 6, 2, 2, 6, 7];
 /** Four triangles from each end's outline to its tip. */
 const CAPS = [0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4, 5, 6, 9, 6, 7, 9, 7, 8, 9, 8, 5, 9];
 
-/** Bodies alone, or with the caps. */
-export type BeadShape = 'body' | 'whole';
-const SHAPES: Readonly<Record<BeadShape, readonly number[]>> = { body: BODY, whole: [...BODY, ...CAPS] };
+/** Beads of a list of segments, bodies alone; or of all segments, with caps, and lines and markers. */
+export type PathKind = 'listed' | 'whole';
+const SHAPES: Readonly<Record<PathKind, readonly number[]>> = { listed: BODY, whole: [...BODY, ...CAPS] };
 
-export interface PathPart {
-  readonly range: ChunkRange;
-  /** One of so many segments. */
-  readonly stride: number;
+/** Beads that are drawn: of a chunk, some in a row. */
+export interface BeadRange {
+  readonly chunk: number;
+  readonly first: number;
+  readonly count: number;
 }
 
-/** A chunk on the GPU. */
-interface Copy {
-  readonly chunk: Chunk;
-  texture: DataTexture;
-  version: number;
-}
+export const beadsOf = ({ chunk, first, count }: ChunkRange): BeadRange => ({
+  chunk: Math.floor(chunk.firstVertex / VERTICES_PER_CHUNK),
+  first,
+  count,
+});
+export const listedBeadsOf = ({ chunk, first, count }: SegmentRange): BeadRange => ({
+  chunk: chunk.index,
+  first,
+  count,
+});
 
 /** Three.js objects of one chunk. */
 interface Drawn {
-  vertices: Copy | null;
-  channels: Copy | null;
   readonly uniforms: Uniforms;
   readonly beads: Mesh<BufferGeometry, RawShaderMaterial[]>;
   readonly travels: LineSegments<BufferGeometry, RawShaderMaterial>;
   readonly markers: Points<BufferGeometry, RawShaderMaterial>;
 }
 
+const indices = new Map<readonly number[], BufferAttribute>();
+
 /** Corner numbers of the beads of a whole chunk, shared by all. */
 function beadIndex(pattern: readonly number[]): BufferAttribute {
+  const known = indices.get(pattern);
+  if (known) return known;
   const index = new Uint32Array(VERTICES_PER_CHUNK * pattern.length);
   let at = 0;
   for (let bead = 0; bead < VERTICES_PER_CHUNK; bead++) {
     for (const corner of pattern) index[at++] = bead * POINTS_PER_BEAD + corner;
   }
-  return new BufferAttribute(index, 1);
+  const made = new BufferAttribute(index, 1);
+  indices.set(pattern, made);
+  return made;
 }
-
-function texelsOf(data: Uint32Array<ArrayBuffer>, width: number, rows: number): DataTexture {
-  const texture = new DataTexture(data, width, rows, RGBAIntegerFormat, UnsignedIntType);
-  texture.internalFormat = 'RGBA32UI';
-  texture.minFilter = NearestFilter;
-  texture.magFilter = NearestFilter;
-  texture.generateMipmaps = false;
-  texture.needsUpdate = true;
-  return texture;
-}
-
-const copyOf = (chunk: Chunk): Copy => ({
-  chunk,
-  texture: texelsOf(chunk.data, TEXELS_PER_ROW, chunk.rows),
-  version: chunk.version,
-});
-
-/** Where a chunk has no channels yet. */
-const NOTHING = texelsOf(new Uint32Array(WORDS_PER_VERTEX), 1, 1);
 
 export class PathObjects {
   readonly scene = new Scene();
   readonly uniforms = new PathUniforms();
+  readonly #textures: PathTextures;
+  readonly #lists: ListTextures | null;
   readonly #pattern: readonly number[];
   readonly #defines: Record<string, number>;
   readonly #drawn: Drawn[] = [];
   /** Objects without a chunk: as long as there are any, the shaders stay compiled. */
   #spare: Drawn | null = null;
-  #index: BufferAttribute | null = null;
 
-  constructor(shape: BeadShape) {
-    this.#pattern = SHAPES[shape];
-    this.#defines = shape === 'body' ? { LIT_AT_CORNERS: 1 } : {};
+  constructor(kind: PathKind, textures: PathTextures) {
+    this.#pattern = SHAPES[kind];
+    this.#defines = kind === 'listed' ? { LISTED: 1 } : {};
+    this.#lists = kind === 'listed' ? new ListTextures() : null;
+    this.#textures = textures;
     this.scene.matrixWorldAutoUpdate = false;
   }
 
-  /** Brings textures up to date with the stores' chunks. */
-  sync(vertices: readonly Chunk[], channels: readonly Chunk[]): void {
+  /** Brings textures up to date with the stores' chunks, and the list's. */
+  sync(vertices: readonly Chunk[], channels: readonly Chunk[], list: SegmentList | null = null): void {
     for (const [at, chunk] of vertices.entries()) {
-      const drawn = this.#drawn[at];
-      if (!drawn) this.#drawn.push(this.#objectsOf(chunk));
-      else if (drawn.vertices && refresh(drawn.vertices)) {
-        put(drawn.uniforms, 'uVertices', drawn.vertices.texture);
+      let drawn = this.#drawn[at];
+      if (!drawn) {
+        drawn = this.#objectsOf(chunk);
+        this.#drawn.push(drawn);
       }
-    }
-    for (const [at, chunk] of channels.entries()) {
-      const drawn = this.#drawn[at];
-      if (!drawn || drawn.channels?.version === chunk.version) continue;
-      if (drawn.channels) refresh(drawn.channels);
-      else drawn.channels = copyOf(chunk);
-      put(drawn.uniforms, 'uChannels', drawn.channels.texture);
-      put(drawn.uniforms, 'uChannelCount', chunk.count);
+      put(drawn.uniforms, 'uVertices', this.#textures.vertices(at, chunk));
+      const known = channels[at];
+      if (known) {
+        put(drawn.uniforms, 'uChannels', this.#textures.channels(at, known));
+        put(drawn.uniforms, 'uChannelCount', known.count);
+      }
+      const listed = list?.chunks[at];
+      if (listed && this.#lists) {
+        put(drawn.uniforms, 'uSegments', this.#lists.segments(at, listed));
+        put(drawn.uniforms, 'uSegmentCount', listed.count);
+      }
     }
   }
 
-  /** Beads of these parts are drawn next, and nothing else. */
-  showBeads(parts: readonly PathPart[]): void {
+  /** Beads of these parts are drawn next, one of so many, and nothing else. */
+  showBeads(parts: readonly BeadRange[], stride = 1): void {
     this.#hideAll();
-    for (const { range, stride } of parts) {
-      const drawn = this.#of(range.chunk);
+    for (const { chunk, first: from, count } of parts) {
+      const drawn = this.#drawn[chunk];
       if (!drawn) continue;
       const perBead = this.#pattern.length;
-      const first = Math.ceil(range.first / stride);
-      const end = Math.ceil((range.first + range.count) / stride);
+      const first = Math.ceil(from / stride);
+      const end = Math.ceil((from + count) / stride);
       drawn.beads.visible = true;
       drawn.beads.geometry.addGroup(first * perBead, (end - first) * perBead, 0);
     }
-    this.uniforms.set('uStride', parts[0]?.stride ?? 1);
+    this.uniforms.set('uStride', stride);
   }
 
   /** Travels and markers of these ranges are drawn next, and nothing else. */
@@ -151,7 +144,7 @@ export class PathObjects {
   ): void {
     this.#hideAll();
     for (const range of ranges) {
-      const drawn = this.#of(range.chunk);
+      const drawn = this.#drawn[beadsOf(range).chunk];
       if (!drawn) continue;
       drawn.travels.visible = what.travels;
       drawn.travels.geometry.setDrawRange(range.first * 2, range.count * 2);
@@ -187,6 +180,7 @@ export class PathObjects {
       else this.#spare = drawn;
     }
     this.#drawn.length = 0;
+    this.#lists?.clear();
   }
 
   /** Takes everything away that was on the GPU. */
@@ -196,10 +190,6 @@ export class PathObjects {
     this.#spare = null;
   }
 
-  #of(chunk: Chunk): Drawn | undefined {
-    return this.#drawn[Math.floor(chunk.firstVertex / VERTICES_PER_CHUNK)];
-  }
-
   #hideAll(): void {
     for (const drawn of this.#drawn) hide(drawn);
   }
@@ -207,19 +197,18 @@ export class PathObjects {
   #objectsOf(chunk: Chunk): Drawn {
     const drawn = this.#spare ?? this.#create();
     this.#spare = null;
-    drawn.vertices = copyOf(chunk);
-    put(drawn.uniforms, 'uVertices', drawn.vertices.texture);
     put(drawn.uniforms, 'uBase', chunk.firstVertex);
     return drawn;
   }
 
   #create(): Drawn {
-    this.#index ??= beadIndex(this.#pattern);
     const uniforms: Uniforms = {
       ...this.uniforms.all,
-      uVertices: { value: NOTHING },
-      uChannels: { value: NOTHING },
+      uVertices: { value: NO_TEXELS },
+      uChannels: { value: NO_TEXELS },
       uChannelCount: { value: 0 },
+      uSegments: { value: NO_SEGMENTS },
+      uSegmentCount: { value: 0 },
       uBase: { value: 0 },
     };
     const material = (vertexShader: string, fragmentShader: string): RawShaderMaterial => {
@@ -234,10 +223,8 @@ export class PathObjects {
       made.uniforms = uniforms;
       return made;
     };
-    const geometry = new BufferGeometry().setIndex(this.#index);
+    const geometry = new BufferGeometry().setIndex(beadIndex(this.#pattern));
     return {
-      vertices: null,
-      channels: null,
       uniforms,
       beads: this.#add(new Mesh(geometry, [material(BEAD_VERTEX, BEAD_FRAGMENT)])),
       travels: this.#add(new LineSegments(new BufferGeometry(), material(TRAVEL_VERTEX, FLAT_FRAGMENT))),
@@ -273,30 +260,14 @@ function hide({ beads, travels, markers }: Drawn): void {
 /** A chunk's textures go, the objects stay. */
 function letGo(drawn: Drawn): void {
   hide(drawn);
-  drawn.vertices?.texture.dispose();
-  drawn.channels?.texture.dispose();
-  drawn.vertices = null;
-  drawn.channels = null;
-  put(drawn.uniforms, 'uVertices', NOTHING);
-  put(drawn.uniforms, 'uChannels', NOTHING);
+  put(drawn.uniforms, 'uVertices', NO_TEXELS);
+  put(drawn.uniforms, 'uChannels', NO_TEXELS);
   put(drawn.uniforms, 'uChannelCount', 0);
+  put(drawn.uniforms, 'uSegments', NO_SEGMENTS);
+  put(drawn.uniforms, 'uSegmentCount', 0);
 }
 
 function put(uniforms: Uniforms, name: string, value: unknown): void {
   const uniform = uniforms[name];
   if (uniform) uniform.value = value;
-}
-
-/** Brings a copy up to date; true if it has another texture now. */
-function refresh(copy: Copy): boolean {
-  const { chunk, texture } = copy;
-  if (copy.version === chunk.version) return false;
-  copy.version = chunk.version;
-  if (texture.image.data === chunk.data) {
-    texture.needsUpdate = true;
-    return false;
-  }
-  texture.dispose();
-  copy.texture = texelsOf(chunk.data, TEXELS_PER_ROW, chunk.rows);
-  return true;
 }

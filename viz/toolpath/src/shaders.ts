@@ -8,6 +8,7 @@
  */
 import { LEAD_TEXELS, TEXELS_PER_ROW } from './chunks';
 import { COLOUR } from './colour_shader';
+import { TEXEL_BITS, TEXEL_MASK } from './segments';
 import { EVENTS, FIELDS, FLAGS, featureNumber, SIZE_STEP_MM } from './vertex';
 
 /** Points of one bead: five at each end. */
@@ -75,7 +76,10 @@ vec3 lit(vec3 colour, vec3 towards) {
 }
 `;
 
-/** With `LIT_AT_CORNERS` defined the light is computed at the corners alone: cheaper, less round near by. */
+/**
+ * With `LISTED` defined the beads are those of a list of segments (segments.ts), and the light is computed at the corners alone:
+ * cheaper, less round near by.
+ */
 export const BEAD_VERTEX = /* glsl */ `${PULL}${COLOUR}
 uniform vec3 cameraPosition;
 uniform uint uFeatures;
@@ -91,7 +95,7 @@ uniform uint uHiddenObjects[8];
 /** The object that stands out; 0: none does. */
 uniform uint uObject;
 
-#ifndef LIT_AT_CORNERS
+#ifndef LISTED
 out vec3 vNormal;
 #endif
 out vec3 vColour;
@@ -106,6 +110,17 @@ const float TIP = 0.8;
 const float OVERLAP = 1.3;
 /** Features whose beads lie on top of each other; the others' lie side by side. */
 const uint WALLS = ${WALLS}u;
+
+#ifdef LISTED
+uniform highp usampler2D uSegments;
+uniform int uSegmentCount;
+/** Of a segment of the list, the texels where it begins and ends; none at its ends. */
+ivec2 segmentAt(int at) {
+  if (at < 0 || at >= uSegmentCount) return ivec2(-1);
+  uint pair = texelFetch(uSegments, ivec2(at & ${TEXELS_PER_ROW - 1}, at >> ${ROW_SHIFT}), 0).r;
+  return ivec2(pair >> ${TEXEL_BITS}, pair & ${TEXEL_MASK}u);
+}
+#endif
 
 bool shown(uvec4 v) {
   if ((v.z & NOT_LAID) != 0u || ((uFeatures >> featureOf(v)) & 1u) == 0u) return false;
@@ -129,16 +144,28 @@ void main() {
   int point = gl_VertexID - bead * ${POINTS_PER_BEAD};
   bool atEnd = point >= 5;
   int part = atEnd ? point - 5 : point;
+#ifdef LISTED
+  int listed = bead * uStride;
+  ivec2 ends = segmentAt(listed);
+  int start = ends.x;
+  int texel = ends.y;
+  // The neighbour at this end goes on from here, or is another run.
+  ivec2 beyond = segmentAt(atEnd ? listed + 1 : listed - 1);
+  bool goesOn = atEnd ? beyond.x == texel : beyond.y == start;
+  int farTexel = !goesOn ? texel : atEnd ? beyond.y : beyond.x;
+#else
   int texel = bead * uStride + ${LEAD_TEXELS};
-
-  uvec4 own = vertexAt(texel);
-#ifndef LIT_AT_CORNERS
+  int start = texel - 1;
+  int farTexel = atEnd ? texel + 1 : texel - 2;
+  const bool goesOn = true;
   vNormal = vec3(0.0, 0.0, 1.0);
 #endif
+
+  uvec4 own = vertexAt(texel);
   vColour = vec3(0.0);
   gl_Position = NOWHERE;
   if (!shown(own)) return;
-  uvec4 before = vertexAt(texel - 1);
+  uvec4 before = vertexAt(start);
   vec3 from = placeOf(before);
   vec3 to = placeOf(own);
   float len = length(to - from);
@@ -146,7 +173,7 @@ void main() {
   vec3 along = (to - from) / len;
 
   // The neighbour at this end, and whether the bead goes on into it.
-  uvec4 far = vertexAt(atEnd ? texel + 1 : texel - 2);
+  uvec4 far = vertexAt(farTexel);
   uvec4 neighbour = atEnd ? far : before;
   vec3 other = atEnd ? placeOf(far) - to : from - placeOf(far);
   float otherLen = length(other);
@@ -155,7 +182,7 @@ void main() {
   vec3 lightTangent = along;
   float mitre = 1.0;
   bool joined = false;
-  if (shown(neighbour) && otherLen > 1e-6) {
+  if (goesOn && shown(neighbour) && otherLen > 1e-6) {
     float bend = dot(along, other / otherLen);
     if (bend > MITRE_COS_MIN) {
       joined = true;
@@ -197,11 +224,12 @@ void main() {
   vec2 lean = wall ? vec2(clamp(seen.x * 5.0, -1.0, 1.0), 0.4 * seen.y) : vec2(0.15 * seen.x, clamp(seen.y * 8.0, -1.0, 1.0));
   vec3 surface = normalize(lightRight * lean.x + lightUp * lean.y + 1e-3 * sight / length(sight));
   vec3 normal = mat3(viewMatrix) * mix(round_, surface, uHeightScale > 1.0 ? 0.8 : smoothstep(0.2, 0.6, pixel / min(size.x, height)));
-  vec3 colour = colourOf(own, bead * uStride, texel);
+  int vertex = texel - ${LEAD_TEXELS};
+  vec3 colour = colourOf(own, vertex, texel);
   if (leavesVolume(from, to)) colour = mix(colour, uWarning, 0.8);
   if (uObject != 0u && objectOf(own) != uObject) colour = mix(colour, uRemaining, 0.7);
-  vColour = uBase + uint(bead * uStride) < uPrinted ? colour : mix(colour, uRemaining, 0.84);
-#ifdef LIT_AT_CORNERS
+  vColour = uBase + uint(vertex) < uPrinted ? colour : mix(colour, uRemaining, 0.84);
+#ifdef LISTED
   vColour = lit(vColour, normal);
 #else
   vNormal = normal;
@@ -212,14 +240,14 @@ void main() {
 
 export const BEAD_FRAGMENT = /* glsl */ `
 precision highp float;
-#ifndef LIT_AT_CORNERS
+#ifndef LISTED
 in vec3 vNormal;
 #endif
 in vec3 vColour;
 out vec4 colour;
 ${LIGHT}
 void main() {
-#ifdef LIT_AT_CORNERS
+#ifdef LISTED
   colour = vec4(vColour, 1.0);
 #else
   colour = vec4(lit(vColour, vNormal), 1.0);

@@ -150,6 +150,10 @@ export class Stage {
   }
 
   /** With or without several samples a pixel in the full picture; what was in it is lost when that changes. */
+  get smooth(): boolean {
+    return this.#picture.samples > 0;
+  }
+
   set smooth(smooth: boolean) {
     const samples = smooth ? SAMPLES : 0;
     if (this.#picture.samples === samples) return;

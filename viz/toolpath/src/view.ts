@@ -12,6 +12,7 @@ import {
   type CameraState,
   DEFAULT_CAMERA,
   fit,
+  isSameCamera,
   orbit,
   PRESETS,
   type Projection,
@@ -20,7 +21,7 @@ import {
   type Vec3,
   zoom,
 } from './camera';
-import type { ColourMode, ValueRange } from './colours';
+import { type ColourMode, PLANNED_MODES, type ValueRange } from './colours';
 import { Content } from './content';
 import { Drawing, EMPTY_BOX, type Model } from './drawing';
 import { FrameLoop, realmClock } from './frames';
@@ -43,12 +44,20 @@ export interface ViewSizePx {
   readonly ratio: number;
 }
 
-/** While vertices arrive, the picture follows this often. */
-const GROWTH_FRAME_MS: Ms = 200;
-/** Where a full picture takes longer, the next ones do without several samples a pixel. */
-const SMOOTH_MAX_MS: Ms = 1500;
+/** While vertices arrive, the picture follows this often: first soon, then not so often that drawing delays the reading. */
+const GROWTH_FRAME_MS: Ms = 150;
+const GROWTH_FRAME_MAX_MS: Ms = 1000;
+const GROWTH_SLOWER = 1.5;
 /** Found ranges are told at most this often. */
 const RANGES_MS: Ms = 250;
+
+const isPlanned = (mode: ColourMode): boolean => PLANNED_MODES.includes(mode);
+
+/** Whether a layer begins where the one in the same place of another list does. */
+const isAt =
+  (others: readonly Layer[]) =>
+  ({ firstVertex }: Layer, at: number): boolean =>
+    others[at]?.firstVertex === firstVertex;
 
 export class ToolpathView {
   readonly #canvas: HTMLCanvasElement | OffscreenCanvas;
@@ -77,6 +86,7 @@ export class ToolpathView {
   /** The camera stands where it was put to see all: then it goes on doing so. */
   #isFitted = false;
   #grown: Ms = 0;
+  #growthMs: Ms = GROWTH_FRAME_MS;
   #rangesTimer: ReturnType<typeof setTimeout> | null = null;
 
   constructor(
@@ -91,8 +101,7 @@ export class ToolpathView {
     canvas.addEventListener('webglcontextlost', this.#onLost);
     canvas.addEventListener('webglcontextrestored', this.#onRestored);
     this.#loop = new FrameLoop(this.#drawing, realmClock(), (report) => {
-      // Once too slow, it stays so: the next picture of this size is no cheaper.
-      if (report.kind === 'full' && report.totalMs > SMOOTH_MAX_MS) this.#drawing.smooth = false;
+      if (report.kind === 'full') this.#drawing.measured(report.segments, report.totalMs);
       tell({ type: 'frame', report });
     });
     this.setTheme('light');
@@ -110,65 +119,64 @@ export class ToolpathView {
     this.#loop.moved();
   }
 
-  /** A new file: what was there goes. */
+  /** A new file: what was there goes. What is shown of it stays as it was said, for that may come before. */
   begin(header: VertexHeader): void {
     this.#empty();
     this.#model.content = new Content(header);
     this.#model.printed = ALL_PRINTED;
-    const { layerFrom, layerTo, vertexFrom, vertexTo, hiddenObjects } = SHOW_ALL;
-    this.#model.shown = {
-      ...this.#model.shown,
-      layerFrom,
-      layerTo,
-      vertexFrom,
-      vertexTo,
-      hiddenObjects,
-    };
-    this.#grown = performance.now();
-    this.#loop.moved();
+    // The first vertices are shown at once; until then there is nothing to see.
+    this.#grown = -Infinity;
+    this.#growthMs = GROWTH_FRAME_MS;
   }
 
   /** The next vertices of the file, four words each; the array is copied. */
   append(vertices: Uint32Array): void {
     this.#model.content?.append(vertices);
+    this.#tellRanges();
     this.#hasGrown();
   }
 
   /** Planner channels of the next vertices that have none yet, four words each; the array is copied. */
   appendChannels(words: Uint32Array): void {
     this.#model.content?.appendChannels(words);
-    this.#hasGrown();
+    this.#tellRanges();
+    if (isPlanned(this.#model.mode)) this.#hasGrown();
   }
 
   /** The file has no more vertices. */
   end(): void {
-    this.#model.content?.end();
+    const { content } = this.#model;
+    content?.end();
     this.#tellRanges();
     this.#loop.moved();
+    if (content) this.#tell({ type: 'built', vertices: content.store.count });
   }
 
   /** No file any more. */
   clear(): void {
+    const wasThere = this.#model.content !== null;
     this.#empty();
-    this.#loop.moved();
+    if (wasThere) this.#loop.moved();
   }
 
   setLayers(layers: readonly Layer[]): void {
+    const same = layers.length === this.#layers.length && layers.every(isAt(this.#layers));
     this.#layers = layers;
     this.#model.content?.setLayers(layers);
     this.#drawing.layerTimes.set(layers);
     this.#tellRanges();
-    this.#loop.moved();
+    // Times alone change no picture but that of times.
+    if (!same || this.#model.mode === 'layerTime') this.#loop.moved();
   }
 
   show(shown: Partial<Shown>): void {
     this.#model.shown = { ...this.#model.shown, ...shown };
-    this.#loop.moved();
+    this.#pathChanged();
   }
 
   setColour(mode: ColourMode): void {
     this.#model.mode = mode;
-    this.#loop.moved();
+    this.#pathChanged();
   }
 
   /** The user's own limits of a mode's colours; null: those found in the file. */
@@ -176,7 +184,7 @@ export class ToolpathView {
     const { [mode]: _, ...others } = this.#model.limits;
     const valid = validRange(mode, range);
     this.#model.limits = valid ? { ...others, [mode]: valid } : others;
-    if (mode === this.#model.mode) this.#loop.moved();
+    if (mode === this.#model.mode) this.#pathChanged();
   }
 
   /** Vertices before this one are printed, the others still to come; null: no difference is shown. */
@@ -216,7 +224,7 @@ export class ToolpathView {
   setHighlightedObject(object: number | null): void {
     if (this.#model.object === object) return;
     this.#model.object = object;
-    this.#loop.moved();
+    this.#pathChanged();
   }
 
   /** What lies outside gets a warning's tint; null: there are no limits. */
@@ -286,7 +294,9 @@ export class ToolpathView {
   fit(direction?: Pick<CameraState, 'azimuth' | 'elevation'>): void {
     const { camera, content, bedBox } = this.#model;
     const box = content?.store.box() ?? bedBox ?? EMPTY_BOX;
-    this.#move(fit({ ...camera, ...direction }, box, this.#drawing.stage.size));
+    const fitted = fit({ ...camera, ...direction }, box, this.#drawing.stage.size);
+    // The empty bed is not drawn again when a file is about to come.
+    if (content || !isSameCamera(fitted, camera)) this.#move(fitted);
     this.#isFitted = true;
   }
 
@@ -302,10 +312,10 @@ export class ToolpathView {
   }
 
   resize({ width, height, ratio }: ViewSizePx): void {
-    this.#drawing.smooth = true;
+    this.#drawing.smooth.reset();
     this.#drawing.stage.resize(width, height, ratio);
     if (this.#isFitted) this.fit();
-    else this.#loop.moved();
+    this.#loop.moved();
   }
 
   dispose(): void {
@@ -339,6 +349,11 @@ export class ToolpathView {
     this.#loop.moved();
   }
 
+  /** Without a file there is nothing to be drawn anew: the first picture of the next one need not wait for that. */
+  #pathChanged(): void {
+    if (this.#model.content) this.#loop.moved();
+  }
+
   #followNozzle(): void {
     const at = this.#nozzleMm;
     const { camera } = this.#model;
@@ -349,11 +364,11 @@ export class ToolpathView {
 
   #hasGrown(): void {
     if (!this.#model.content) return;
-    this.#tellRanges();
     const now = performance.now();
-    if (now - this.#grown < GROWTH_FRAME_MS) return;
+    if (now - this.#grown < this.#growthMs) return;
     this.#grown = now;
-    this.#loop.moved();
+    this.#growthMs = Math.min(this.#growthMs * GROWTH_SLOWER, GROWTH_FRAME_MAX_MS);
+    this.#loop.grew();
   }
 
   /** Soon, and not oftener than it helps. */
@@ -364,7 +379,9 @@ export class ToolpathView {
       if (!content) return;
       this.#tell({ type: 'ranges', ranges: content.ranges, isWhole: content.isWhole });
       // What has come since the last picture may be in colour.
-      if (mode !== 'feature') this.#loop.moved();
+      if (!isPlanned(mode)) return;
+      if (content.isWhole) this.#loop.moved();
+      else this.#loop.grew();
     }, RANGES_MS);
   }
 

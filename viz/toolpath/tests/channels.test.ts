@@ -1,6 +1,5 @@
 import { describe, expect, test } from 'vitest';
-import { CHANNELS, ChannelSum, decodeChannels, encodeChannels } from '../src/channels';
-import { VERTICES_PER_CHUNK } from '../src/chunks';
+import { CHANNELS, decodeChannels, encodeChannels } from '../src/channels';
 import { Content } from '../src/content';
 import { layerTimes } from '../src/layer_times';
 import { encodeVertex, FLAGS } from '../src/vertex';
@@ -35,26 +34,6 @@ describe('the bits of channels', () => {
     encodeChannels(words, 0, { flow: 1e9, fan: 1e9, nozzle: -5, timeS: 1 });
     expect(decodeChannels(words, 0)).toMatchObject({ fan: 127, nozzle: 0, flow: 65535 / 512, feed: 0 });
     expect(Object.keys(CHANNELS)).toHaveLength(7);
-  });
-
-  test('several segments as one: averages by time, peaks, the last of what is set', () => {
-    const words = new Uint32Array(12);
-    encodeChannels(words, 0, { meanSpeed: 100, peakSpeed: 110, accel: 1000, flow: 4, fan: 10, timeS: 3 });
-    encodeChannels(words, 1, { meanSpeed: 20, peakSpeed: 50, accel: 4000, flow: 8, fan: 20, timeS: 1 });
-    const sum = new ChannelSum();
-    sum.add(words, 0);
-    sum.add(words, 4);
-    sum.take(words, 8);
-    expect(decodeChannels(words, 2)).toMatchObject({
-      meanSpeed: 80,
-      peakSpeed: 110,
-      accel: 4000,
-      flow: 5,
-      fan: 20,
-      timeS: 4,
-    });
-    sum.take(words, 8);
-    expect(decodeChannels(words, 2)).toBeNull();
   });
 });
 
@@ -102,25 +81,6 @@ describe('channels of a file', () => {
       expect(temperature).toEqual([200, 200]);
       expect(layerTime).toBeUndefined();
     }
-  });
-
-  test('the coarse path has channels for each of its vertices, over chunks and in any pieces', () => {
-    const count = VERTICES_PER_CHUNK + 3000;
-    const { vertices, channels } = line(count);
-    const content = new Content(HEADER);
-    content.append(vertices);
-    content.appendChannels(channels.subarray(0, 4 * 1234));
-    content.end();
-    content.appendChannels(channels.subarray(4 * 1234));
-    const { store, channels: coarse } = content.rough;
-    expect(store.count).toBeGreaterThan(50);
-    expect(store.count).toBeLessThan(count / 10);
-    expect(coarse.count).toBe(store.count);
-    const times = coarse.chunks.reduce((sum, { data, count: own }) => {
-      for (let at = 0; at < own; at++) sum += decodeChannels(data, 2 + at)?.timeS ?? 0;
-      return sum;
-    }, 0);
-    expect(times).toBeCloseTo((count - 1) * 0.01, 1);
   });
 
   test('times of layers, one float each in whole rows', () => {

@@ -1,6 +1,8 @@
 import { describe, expect, test } from 'vitest';
-import { Coarsener, Rough, TOLERANCE_MM } from '../src/coarse';
+import { LEAD_TEXELS, VERTICES_PER_CHUNK, VertexStore } from '../src/chunks';
+import { Rough, TOLERANCE_MM } from '../src/coarse';
 import { LayerList } from '../src/layers';
+import { TEXEL_BITS, TEXEL_MASK } from '../src/segments';
 import { encodeVertex, type FeatureName, FLAGS, field, positionMm } from '../src/vertex';
 
 const HEADER = { originMm: [0, 0, 0], stepMm: 2 ** -10 } as const;
@@ -21,16 +23,37 @@ function encoded(points: readonly Point[]): Uint32Array {
   return words;
 }
 
-/** The kept vertices, fed in pieces. */
-function kept(words: Uint32Array, piece = words.length / 4): Uint32Array {
-  const coarsener = new Coarsener(HEADER);
-  const out: number[] = [];
-  for (let at = 0; at < words.length; at += piece * 4)
-    out.push(...coarsener.push(words.subarray(at, at + piece * 4)));
-  out.push(...coarsener.finish());
-  expect(coarsener.count).toBe(out.length / 4);
-  return new Uint32Array(out);
+interface Segment {
+  readonly isOuter: boolean;
+  /** Vertices of the file. */
+  readonly from: number;
+  readonly to: number;
 }
+
+function roughOf(words: Uint32Array, piece = words.length / 4): Rough {
+  const rough = new Rough(HEADER);
+  for (let at = 0; at < words.length; at += piece * 4) rough.append(words.subarray(at, at + piece * 4));
+  rough.end();
+  return rough;
+}
+
+/** The listed segments, in the order of the file. */
+function listed(rough: Rough): Segment[] {
+  const all = [true, false].flatMap((isOuter) => {
+    const { segments } = isOuter ? rough.outer : rough.inner;
+    return segments.chunks.flatMap(({ index, data, count }) => {
+      const before = index * VERTICES_PER_CHUNK - LEAD_TEXELS;
+      return Array.from(data.subarray(0, count), (pair) => ({
+        isOuter,
+        from: before + (pair >>> TEXEL_BITS),
+        to: before + (pair & TEXEL_MASK),
+      }));
+    });
+  });
+  return all.sort((one, other) => one.to - other.to);
+}
+
+const segmentsOf = (words: Uint32Array, piece?: number): Segment[] => listed(roughOf(words, piece));
 
 const circle = (sides: number): Point[] =>
   Array.from({ length: sides + 1 }, (_, side) => {
@@ -41,31 +64,32 @@ const circle = (sides: number): Point[] =>
 describe('the coarse path', () => {
   test('a line of many pieces becomes one segment', () => {
     const line: Point[] = Array.from({ length: 100 }, (_, at) => [at, 5, at === 0 ? FLAGS.break : 0]);
-    const words = kept(encoded(line));
-    expect(words.length / 4).toBe(2);
-    expect(positionMm(HEADER, words, 1)[0]).toBe(99);
+    expect(segmentsOf(encoded(line))).toEqual([{ isOuter: true, from: 0, to: 99 }]);
   });
 
-  test('a circle keeps within the tolerance with far fewer vertices', () => {
-    const points = circle(2000);
-    const words = kept(encoded(points));
-    const count = words.length / 4;
-    expect(count).toBeLessThan(120);
-    expect(count).toBeGreaterThan(12);
-    for (let at = 1; at < count; at++) {
-      const [ax, ay] = positionMm(HEADER, words, at - 1);
-      const [bx, by] = positionMm(HEADER, words, at);
+  test('a circle keeps within the tolerance with far fewer segments, without a gap', () => {
+    const words = encoded(circle(2000));
+    const segments = segmentsOf(words);
+    expect(segments.length).toBeLessThan(120);
+    expect(segments.length).toBeGreaterThan(12);
+    let at = 0;
+    for (const { from, to } of segments) {
+      expect(from).toBe(at);
+      at = to;
+      const [ax, ay] = positionMm(HEADER, words, from);
+      const [bx, by] = positionMm(HEADER, words, to);
       const fromCentre = Math.hypot((ax + bx) / 2 - 50, (ay + by) / 2 - 50);
       expect(20 - fromCentre).toBeLessThanOrEqual(2 * TOLERANCE_MM);
     }
+    expect(at).toBe(2000);
   });
 
   test.each([1, 2, 7, 500])('pieces of %i vertices give the same', (piece) => {
     const words = encoded(circle(300));
-    expect([...kept(words, piece)]).toEqual([...kept(words)]);
+    expect(segmentsOf(words, piece)).toEqual(segmentsOf(words));
   });
 
-  test('corners, travels, other features and layers are kept', () => {
+  test('corners, other features and layers are kept; travels are in no list', () => {
     const points: Point[] = [
       [0, 0, FLAGS.break],
       [10, 0],
@@ -75,24 +99,40 @@ describe('the coarse path', () => {
       [40, 10],
       [50, 10, 0, 'infill'],
       [60, 10, 0, 'infill', 1],
+      [70, 10, 0, 'overhangWall', 1],
     ];
-    expect(kept(encoded(points)).length / 4).toBe(points.length);
+    expect(segmentsOf(encoded(points)).map(({ isOuter, from, to }) => [isOuter, from, to])).toEqual([
+      [true, 0, 1],
+      [true, 1, 2],
+      [true, 4, 5],
+      [false, 5, 6],
+      [false, 6, 7],
+      [true, 7, 8],
+    ]);
   });
 
   test('turning back on the same line is kept', () => {
-    expect(
-      kept(
-        encoded([
-          [0, 0, FLAGS.break],
-          [10, 0],
-          [4, 0],
-          [8, 0],
-        ]),
-      ).length / 4,
-    ).toBe(4);
+    const points: Point[] = [
+      [0, 0, FLAGS.break],
+      [10, 0],
+      [4, 0],
+      [8, 0],
+    ];
+    expect(segmentsOf(encoded(points))).toHaveLength(3);
   });
 
-  test('layers and printed places are found again', () => {
+  test('a run ends with its chunk, and the next begins at the vertex before, which both have', () => {
+    const count = VERTICES_PER_CHUNK + 100;
+    const line: Point[] = Array.from({ length: count }, (_, at) => [at / 128, 5, at === 0 ? FLAGS.break : 0]);
+    const segments = segmentsOf(encoded(line));
+    expect(segments.reduce((sum, { from, to }) => sum + to - from, 0)).toBe(count - 1);
+    expect(segments.find(({ to }) => to === VERTICES_PER_CHUNK - 1)).toBeDefined();
+    expect(segments.find(({ from }) => from === VERTICES_PER_CHUNK - 1)).toBeDefined();
+  });
+});
+
+describe('what is drawn of it', () => {
+  test('layers and places are found again', () => {
     const points: Point[] = Array.from({ length: 40 }, (_, at) => [
       at % 20,
       0,
@@ -100,19 +140,46 @@ describe('the coarse path', () => {
       'outerWall',
       at < 20 ? 0 : 1,
     ]);
-    const rough = new Rough(HEADER);
-    rough.append(encoded(points));
-    rough.end();
+    const words = encoded(points);
+    const { outer } = roughOf(words);
+    const store = new VertexStore(HEADER);
+    store.append(words);
     const layers = new LayerList([
       { firstVertex: 0, zMm: 0.2 },
       { firstVertex: 20, zMm: 0.4 },
     ]);
-    const { ranges } = rough.reduced({ first: 20, end: 40 }, layers, 1000);
-    const chunk = rough.store.chunks[0];
-    if (!chunk || !ranges[0]) throw new Error('nothing kept');
-    for (let at = ranges[0].first; at < ranges[0].end; at++)
-      expect(field(chunk.data, at + 2, 'layer')).toBe(1);
-    expect(ranges[0].end).toBe(rough.store.count);
-    expect(rough.coarseOf(0)).toBe(0);
+    const { ranges } = outer.reduced({ first: 20, end: 40 }, layers, 1000);
+    const parts = ranges.flatMap((range) => outer.segments.split(range));
+    expect(parts.map(({ count }) => count)).toEqual([2]);
+    for (const { chunk, first, count } of parts) {
+      for (let at = first; at < first + count; at++) {
+        const texel = (chunk.data[at] ?? 0) & TEXEL_MASK;
+        expect(field(store.chunks[0]?.data ?? new Uint32Array(), texel, 'layer')).toBe(1);
+      }
+    }
+    expect(outer.segments.entryAt(0)).toBe(0);
+    expect(outer.segments.entryAt(1_000_000)).toBe(outer.segments.count);
+  });
+
+  test('outer walls have the budget first, and the rest what is left', () => {
+    const layers = Array.from({ length: 30 }, (_, layer): Point[] => [
+      [0, layer, FLAGS.travel, 'outerWall', layer],
+      [5, layer, 0, 'outerWall', layer],
+      [5, layer + 5, 0, 'outerWall', layer],
+      [0, layer + 9, 0, 'infill', layer],
+      [7, layer + 2, 0, 'infill', layer],
+    ]);
+    const rough = roughOf(encoded(layers.flat()));
+    const all = [{ first: 0, end: 150 }];
+    expect([rough.outer.total(all), rough.inner.total(all)]).toEqual([60, 60]);
+    expect(rough.shares(all, 1000)).toEqual([60, 60]);
+    // Every layer's outer walls stay.
+    expect(rough.shares(all, 100)).toEqual([60, 40]);
+    const [outer, inner] = rough.shares(all, 80);
+    expect(outer).toBeCloseTo(52);
+    expect(outer + inner).toBeCloseTo(80);
+    // Where there are none, the rest has all of it.
+    const plain = roughOf(encoded(Array.from({ length: 50 }, (_, at): Point => [at % 2, at, 0, 'other'])));
+    expect(plain.shares([{ first: 0, end: 50 }], 20)).toEqual([0, 20]);
   });
 });

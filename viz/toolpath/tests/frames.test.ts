@@ -1,5 +1,5 @@
 import { describe, expect, test } from 'vitest';
-import { DetailBudget, FRAME_TARGET_MS } from '../src/detail';
+import { DetailBudget, FRAME_TARGET_MS, SmoothChoice } from '../src/detail';
 import { type FrameClock, FrameLoop, type FrameReport, type Painter } from '../src/frames';
 
 /** A clock that is driven by the test. */
@@ -186,5 +186,32 @@ describe('the budget', () => {
     budget.measured(Number.NaN, 5);
     budget.measured(5_000, Number.NaN);
     expect(budget.segments).toBe(16_000);
+  });
+});
+
+describe('several samples a pixel', () => {
+  test('are given up where they take long, and come back where that was not their fault', () => {
+    const choice = new SmoothChoice();
+    expect(choice.isWorth(1_000_000)).toBe(true);
+    choice.measured(true, 1_000_000, 4000);
+    expect(choice.isWorth(1_000_000)).toBe(false);
+    // Less to draw is worth it again.
+    expect(choice.isWorth(100_000)).toBe(true);
+    choice.measured(false, 1_000_000, 2000);
+    expect(choice.isWorth(1_000_000)).toBe(false);
+    // The machine was busy with something else.
+    choice.measured(false, 1_000_000, 100);
+    expect(choice.isWorth(1_000_000)).toBe(true);
+    choice.measured(true, 1_000_000, 250);
+    expect(choice.isWorth(1_000_000)).toBe(true);
+  });
+
+  test('small pictures always have them, and another size is measured anew', () => {
+    const choice = new SmoothChoice();
+    choice.measured(true, 20_000, 60_000);
+    expect(choice.isWorth(20_000)).toBe(true);
+    expect(choice.isWorth(1_000_000)).toBe(false);
+    choice.reset();
+    expect(choice.isWorth(1_000_000)).toBe(true);
   });
 });

@@ -1,6 +1,6 @@
 // The preview: the 3D view with what belongs to it, the file's text, and the place where files are dropped.
 import type { JSX } from 'preact';
-import { file, reading, summary } from '../state/preview';
+import { file, outline, reading } from '../state/preview';
 import { settings } from '../state/settings';
 import { Icon } from './icons';
 import { formatNumber } from './numbers';
@@ -32,7 +32,7 @@ function NoView({ reason }: { readonly reason: string }): JSX.Element {
 
 /** What the view does not show of the file, or not where it is. */
 function Short(): JSX.Element | null {
-  const { leftOut = 0, clamped = 0, vertices = 0 } = summary.value ?? {};
+  const { leftOut = 0, clamped = 0, vertices = 0 } = outline.value ?? {};
   if (leftOut === 0 && clamped === 0) return null;
   return (
     <div class="view-short" role="status">
@@ -85,7 +85,7 @@ export function Viewer(): JSX.Element {
             {hasView && <Short />}
             {hasView && <ViewTools isFlat={isFlat.value} />}
           </div>
-          {summary.value && hasView && (
+          {outline.value && hasView && (
             <>
               <Legend isFlat={isFlat.value} />
               <SegmentCard />
@@ -93,13 +93,13 @@ export function Viewer(): JSX.Element {
             </>
           )}
         </div>
-        {summary.value && hasView && <LayerBar />}
+        {outline.value && hasView && <LayerBar />}
         {hasText && <GcodeText />}
       </div>
       {progress !== null && (
         <progress class="reading" aria-label="Reading the file" max={1} value={progress} />
       )}
-      {summary.value && hasView && <MoveBar />}
+      {outline.value && hasView && <MoveBar />}
     </section>
   );
 }

@@ -27,6 +27,8 @@ export interface FilePreview {
   takeThumbnails(): readonly Thumbnail[];
   /** What the planner knows of the vertices, in their order, later than they come; new since last time. */
   takeChannels(): Uint32Array<ArrayBuffer>;
+  /** Works on what was fed for channels and summary alone: in place of taking vertices. */
+  readOn(): void;
   /** After `finish`. */
   summary(): Summary;
   free(): void;
@@ -34,6 +36,8 @@ export interface FilePreview {
 
 export interface Reader {
   preview(config: string | null): FilePreview;
+  /** The geometry alone, in a fraction of the time; its summary has no times, and not what the machine cannot do. */
+  outline(config: string): FilePreview;
   checkConfig(text: string): ConfigReport;
   /** What stands against reading a file as G-code, judged by its first bytes; null where nothing does. */
   refuse(head: Uint8Array, name: string): Trouble | null;
@@ -42,7 +46,17 @@ export interface Reader {
 
 export async function loadReader(): Promise<Reader> {
   await initialise();
-  return { preview: (config) => new WasmPreview(config), checkConfig, refuse, asTrouble: plannerTrouble };
+  return {
+    preview: (config) => {
+      const preview = new Preview(config ?? undefined);
+      if (config !== null) preview.want_channels();
+      return new WasmPreview(preview);
+    },
+    outline: (config) => new WasmPreview(Preview.outline(config)),
+    checkConfig,
+    refuse,
+    asTrouble: plannerTrouble,
+  };
 }
 
 /** So much of a file says what it is. */
@@ -129,9 +143,8 @@ function fromSummary(summary: PreviewSummary): Summary {
 class WasmPreview implements FilePreview {
   readonly #inner: Preview;
 
-  constructor(config: string | null) {
-    this.#inner = new Preview(config ?? undefined);
-    if (config !== null) this.#inner.want_channels();
+  constructor(inner: Preview) {
+    this.#inner = inner;
   }
 
   wants(): number {
@@ -174,6 +187,10 @@ class WasmPreview implements FilePreview {
 
   takeChannels(): Uint32Array<ArrayBuffer> {
     return this.#inner.take_channels() as Uint32Array<ArrayBuffer>;
+  }
+
+  readOn(): void {
+    this.#inner.read_on();
   }
 
   summary(): Summary {

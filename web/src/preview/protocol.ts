@@ -173,7 +173,9 @@ export type FromPreview =
   | { readonly kind: 'thumbnails'; readonly job: number; readonly thumbnails: readonly Thumbnail[] }
   /** The file is packed and too large to be kept unpacked: any look at its text reads it from its beginning. */
   | { readonly kind: 'slow-text'; readonly job: number }
-  | { readonly kind: 'progress'; readonly job: number; readonly bytes: number; readonly lines: number }
+  | { readonly kind: 'progress'; readonly job: number; readonly share: number; readonly lines: number }
+  /** The geometry is whole: the summary without times, and without what the machine cannot do. */
+  | { readonly kind: 'outline'; readonly job: number; readonly outline: Summary }
   | { readonly kind: 'summary'; readonly job: number; readonly summary: Summary }
   /** Fewer where the file ends before; none where it cannot be read. */
   | { readonly kind: 'lines'; readonly id: number; readonly texts: readonly string[] }

@@ -1,11 +1,14 @@
-// The preview worker: reads a file through the planner's preview and hands out geometry, findings and estimates. Also
-// checks printer.cfg texts. One file at a time: a new one ends the reading of the one before.
+// The preview worker: reads a file through the planner's preview, twice: for the geometry, which is soon there, and for
+// times, findings and the planner's channels. Also checks printer.cfg texts. One file at a time: a new one ends the reading of
+// the one before.
 import type { Layer, SourcedRequest, ViewRequest } from '@stepcast/toolpath';
-import { FileChunks, linesOf, packingOf } from '../files';
+import { FileChunks, linesOf, type Packing, packingOf } from '../files';
+import type { Trouble } from '../machine/protocol';
 import { fileUnreadable, plannerMissing } from '../machine/troubles';
 import { LineIndex } from './line_index';
 import { type FilePreview, loadReader, type Reader } from './planner';
 import type { FromPreview, Summary, ToPreview } from './protocol';
+import { SlicedFile } from './sliced_file';
 import { Unpacked } from './unpacked';
 
 /** Progress is told this often at most, in ms. */
@@ -23,14 +26,20 @@ function load(): Promise<Reader> {
   return loading;
 }
 
-/** Without a machine where its file has errors: the picture is the same, and nothing can be printed with it anyway. */
-function openPreview(reader: Reader, config: string | null): FilePreview {
+/** A file's geometry, and the machine that it is for. */
+interface Geometry {
+  readonly preview: FilePreview;
+  /** Null: there is none, or its file has errors. The picture is the same, and nothing can be printed with it anyway. */
+  readonly config: string | null;
+}
+
+function openGeometry(reader: Reader, config: string | null): Geometry {
   try {
-    return reader.preview(config);
+    if (config !== null) return { preview: reader.outline(config), config };
   } catch (error) {
-    if (config === null || reader.asTrouble(error) === null) throw error;
-    return reader.preview(null);
+    if (reader.asTrouble(error) === null) throw error;
   }
+  return { preview: reader.preview(null), config: null };
 }
 
 /** The 3D view, where there is one. */
@@ -61,19 +70,24 @@ function pass(preview: FilePreview, job: number): void {
     if (steps.length > 0) tell({ kind: 'line-steps', job, steps }, [steps.buffer]);
     const thumbnails = preview.takeThumbnails();
     if (thumbnails.length > 0) tell({ kind: 'thumbnails', job, thumbnails });
-    if (vertices.length > 0) draw(job, { type: 'append', vertices }, [vertices.buffer]);
-    const words = preview.takeChannels();
-    if (words.length > 0) draw(job, { type: 'appendChannels', words }, [words.buffer]);
     if (vertices.length === 0) return;
+    draw(job, { type: 'append', vertices }, [vertices.buffer]);
   }
 }
 
-function feed(preview: FilePreview, job: number, chunk: Uint8Array): void {
+/** Has the planner work on the bytes that were fed, and hands out what it knows by now. */
+function plan(preview: FilePreview, job: number): void {
+  preview.readOn();
+  const words = preview.takeChannels();
+  if (words.length > 0) draw(job, { type: 'appendChannels', words }, [words.buffer]);
+}
+
+function feed(preview: FilePreview, job: number, chunk: Uint8Array, work: typeof pass): void {
   for (let rest = chunk; rest.byteLength > 0; ) {
     const piece = rest.subarray(0, preview.wants());
     if (piece.byteLength === 0) throw new Error('the preview wants nothing more');
     preview.feed(piece);
-    pass(preview, job);
+    work(preview, job);
     rest = rest.subarray(piece.byteLength);
   }
 }
@@ -87,47 +101,108 @@ function layersOf({ layers, time }: Summary): Layer[] {
   }));
 }
 
-async function read(
-  reader: Reader,
-  { job, file, name, config }: ToPreview & { kind: 'open' },
-): Promise<void> {
-  const packing = await packingOf(file);
-  const chunks = await FileChunks.open(file, packing);
-  const first = await chunks.next();
-  const refusal = reader.refuse(first ?? new Uint8Array(), name.replace(/\.gz$/i, ''));
-  if (refusal) {
-    await chunks.cancel();
-    return tell({ kind: 'failed', job, trouble: refusal });
+/** Tells how far the reading is, now and then; `share` 0 … 1. */
+function progress(job: number): (share: number, lines: number) => void {
+  let told = 0;
+  return (share, lines) => {
+    if (performance.now() - told <= PROGRESS_MS) return;
+    told = performance.now();
+    tell({ kind: 'progress', job, share, lines });
+  };
+}
+
+/** Of the whole reading, in time. */
+const GEOMETRY_SHARE = 0.35;
+
+/** The geometry as it is read, and the outline at its end; null where the file was put away meanwhile. */
+async function readGeometry(chunks: Chunks, preview: FilePreview, open: Opened): Promise<Summary | null> {
+  const { job, file, index, unpacked } = open;
+  const told = progress(job);
+  draw(job, { type: 'begin', header: preview.header() });
+  for (let chunk = await chunks.next(); chunk; chunk = await chunks.next()) {
+    if (current !== job) return null;
+    index.add(chunk);
+    unpacked?.add(chunk);
+    feed(preview, job, chunk, pass);
+    told((GEOMETRY_SHARE * chunks.bytesRead) / Math.max(1, file.size), index.lines);
   }
-  const preview = openPreview(reader, config);
-  const index = new LineIndex();
-  const unpacked = packing === 'gzip' ? new Unpacked() : null;
-  if (current === job) opened = { job, file, index, unpacked };
+  preview.finish();
+  pass(preview, job);
+  const outline = preview.summary();
+  draw(job, { type: 'setLayers', layers: layersOf(outline) });
+  draw(job, { type: 'end' });
+  draw(job, { type: 'fit' });
+  tell({ kind: 'outline', job, outline });
+  return outline;
+}
+
+/** What the planner knows of it, and the summary. It takes longer, so it comes behind the geometry. */
+async function readPlan(chunks: Chunks, preview: FilePreview, open: Opened): Promise<void> {
+  const { job, file, index } = open;
+  const told = progress(job);
+  for (let chunk = await chunks.next(); chunk; chunk = await chunks.next()) {
+    if (current !== job) return;
+    feed(preview, job, chunk, plan);
+    told(GEOMETRY_SHARE + ((1 - GEOMETRY_SHARE) * chunks.bytesRead) / Math.max(1, file.size), index.lines);
+  }
+  preview.finish();
+  plan(preview, job);
+  const summary = preview.summary();
+  draw(job, { type: 'setLayers', layers: layersOf(summary) });
+  tell({ kind: 'summary', job, summary });
+}
+
+type Chunks = Pick<FileChunks, 'next' | 'bytesRead'>;
+
+/** Reads the open file from its beginning with this preview. */
+async function through<T>(
+  open: Opened,
+  preview: FilePreview,
+  read: (chunks: Chunks, preview: FilePreview, open: Opened) => Promise<T>,
+): Promise<T> {
   try {
-    let told = 0;
-    draw(job, { type: 'begin', header: preview.header() });
-    for (let chunk = first; chunk; chunk = await chunks.next()) {
-      if (current !== job) return;
-      index.add(chunk);
-      unpacked?.add(chunk);
-      feed(preview, job, chunk);
-      if (performance.now() - told > PROGRESS_MS) {
-        told = performance.now();
-        tell({ kind: 'progress', job, bytes: chunks.bytesRead, lines: index.lines });
-      }
+    if (!open.unpacked) return await read(new SlicedFile(open.file), preview, open);
+    const chunks = await FileChunks.open(open.file, 'gzip');
+    try {
+      return await read(chunks, preview, open);
+    } finally {
+      await chunks.cancel();
     }
-    preview.finish();
-    pass(preview, job);
-    const summary = preview.summary();
-    draw(job, { type: 'setLayers', layers: layersOf(summary) });
-    draw(job, { type: 'end' });
-    draw(job, { type: 'fit' });
-    tell({ kind: 'summary', job, summary });
-    if (unpacked?.isGivenUp) tell({ kind: 'slow-text', job });
   } finally {
     preview.free();
-    await chunks.cancel();
   }
+}
+
+/** What stands against reading the file, by its first bytes. */
+async function refusalOf(
+  reader: Reader,
+  file: Blob,
+  packing: Packing,
+  name: string,
+): Promise<Trouble | null> {
+  const chunks = await FileChunks.open(file, packing);
+  const first = await chunks.next();
+  await chunks.cancel();
+  return reader.refuse(first ?? new Uint8Array(), name.replace(/\.gz$/i, ''));
+}
+
+async function read(
+  reader: Reader,
+  { job, file, name, config: machine }: ToPreview & { kind: 'open' },
+): Promise<void> {
+  const packing = await packingOf(file);
+  const refusal = await refusalOf(reader, file, packing, name);
+  if (refusal) return tell({ kind: 'failed', job, trouble: refusal });
+  if (current !== job) return;
+  const unpacked = packing === 'gzip' ? new Unpacked() : null;
+  const open = { job, file, index: new LineIndex(), unpacked };
+  opened = open;
+  const { preview, config } = openGeometry(reader, machine);
+  const outline = await through(open, preview, readGeometry);
+  if (!outline || current !== job) return;
+  if (unpacked?.isGivenUp) tell({ kind: 'slow-text', job });
+  if (config === null) tell({ kind: 'summary', job, summary: outline });
+  else await through(open, reader.preview(config), readPlan);
 }
 
 async function open(message: ToPreview & { kind: 'open' }): Promise<void> {

@@ -2,7 +2,7 @@
 // times are known, a layer's time is spread over its moves, or each takes the same.
 import { signal } from '@preact/signals';
 import type { Slice } from '@stepcast/toolpath';
-import { summary } from './preview';
+import { outline } from './preview';
 import { layerOf } from './print';
 import { cursor, layerFrom, layerTo, movesOf, moveTo, showUpTo, topMoves } from './view';
 import { verticesOf } from './view_answers';
@@ -77,7 +77,7 @@ export function timesOf({ vertices, channels }: Slice, otherwise: number): Float
 
 /** What a move of this layer takes on average. */
 function meanTime(vertex: number): number {
-  const plan = summary.peek();
+  const plan = outline.peek();
   if (!plan) return MOVE_S;
   const layer = Math.max(0, layerOf(plan.layers, vertex) - 1);
   const { first, last } = movesOf(plan, layer);
@@ -101,10 +101,10 @@ function shown(): number {
 /** Fetches the times from this vertex on. */
 async function fetchFrom(vertex: number): Promise<void> {
   isFetching = true;
-  const plan = summary.peek();
+  const plan = outline.peek();
   const slice = await verticesOf(vertex, vertex + WINDOW);
   isFetching = false;
-  if (!isPlaying.peek() || plan !== summary.peek()) return;
+  if (!isPlaying.peek() || plan !== outline.peek()) return;
   if (!slice) return stop();
   // The view's worker is behind the one that reads the file: the next step asks again.
   if (slice.vertices.length === 0) return;
@@ -121,7 +121,7 @@ function showPlayed(vertex: number): void {
 }
 
 function step(): void {
-  const plan = summary.peek();
+  const plan = outline.peek();
   if (!plan) return stop();
   if (isFetching) return;
   const now = performance.now();
@@ -148,7 +148,7 @@ export function stop(): void {
 /** Plays on from what is shown; from the beginning where that is everything. */
 export function play(): void {
   const moves = topMoves.peek();
-  const plan = summary.peek();
+  const plan = outline.peek();
   if (!plan || !moves || timer !== undefined) return;
   const isAll = layerTo.peek() === null;
   const start = isAll ? movesOf(plan, layerFrom.peek()).first : moves.first;

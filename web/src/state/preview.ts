@@ -1,6 +1,6 @@
 // The file that is shown and may be printed: its reading, what was found in it, what the user has confirmed.
 // The other end is the preview worker, which never disturbs a running print.
-import { effect, signal } from '@preact/signals';
+import { batch, effect, signal } from '@preact/signals';
 import type { Trouble } from '../machine/protocol';
 import { previewDied } from '../machine/troubles';
 import type { ConfigReport, FromPreview, Summary, Thumbnail, ToPreview } from '../preview/protocol';
@@ -24,7 +24,13 @@ export interface GeometrySink {
 export const file = signal<OpenFile | null>(null);
 /** 0 … 1 while the file is being read; null otherwise. */
 export const reading = signal<number | null>(null);
+/** Once the planner has gone through the file too. */
 export const summary = signal<Summary | null>(null);
+/**
+ * What is in the file, for the view: at hand as soon as its geometry is, then without times and without what the machine
+ * cannot do; from then on, what `summary` says.
+ */
+export const outline = signal<Summary | null>(null);
 export const failure = signal<Trouble | null>(null);
 /** Its text takes a while to come: it is packed, and too large to be kept unpacked. */
 export const isTextSlow = signal(false);
@@ -146,6 +152,7 @@ function read(config: string): void {
   job += 1;
   reading.value = 0;
   summary.value = null;
+  outline.value = null;
   failure.value = null;
   confirmed.value = new Set();
   marks = new LineMarks();
@@ -172,6 +179,7 @@ export function closeFile(): void {
   file.value = null;
   reading.value = null;
   summary.value = null;
+  outline.value = null;
   failure.value = null;
   linesRead.value = 0;
   isTextSlow.value = false;
@@ -250,14 +258,21 @@ function take(message: FromPreview): void {
       thumbnails.value = [...thumbnails.value, ...message.thumbnails];
       break;
     case 'progress':
-      reading.value = Math.min(1, message.bytes / Math.max(1, file.value?.blob.size ?? 1));
+      reading.value = Math.min(1, message.share);
       linesRead.value = message.lines;
+      break;
+    case 'outline':
+      linesRead.value = message.outline.lines;
+      outline.value = message.outline;
       break;
     case 'summary':
       deaths = 0;
-      reading.value = null;
-      linesRead.value = message.summary.lines;
-      summary.value = message.summary;
+      batch(() => {
+        reading.value = null;
+        linesRead.value = message.summary.lines;
+        outline.value = message.summary;
+        summary.value = message.summary;
+      });
       break;
     case 'failed':
       reading.value = null;

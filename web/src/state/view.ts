@@ -3,7 +3,7 @@
 import { computed, signal } from '@preact/signals';
 import type { ColourMode, ColourRanges, FeatureName, ValueRange } from '@stepcast/toolpath';
 import type { Summary } from '../preview/protocol';
-import { lineMarks, summary } from './preview';
+import { lineMarks, outline } from './preview';
 import { layerOf } from './print';
 
 export const layerFrom = signal(0);
@@ -35,7 +35,7 @@ export interface Cursor {
 }
 export const cursor = signal<Cursor | null>(null);
 
-export const layerCount = computed(() => summary.value?.layers.length ?? 0);
+export const layerCount = computed(() => outline.value?.layers.length ?? 0);
 export const topLayer = computed(() =>
   Math.max(0, Math.min(layerTo.value ?? layerCount.value - 1, layerCount.value - 1)),
 );
@@ -54,7 +54,7 @@ export function movesOf(plan: Pick<Summary, 'layers' | 'vertices'>, layer: numbe
 
 /** Of the topmost layer that is shown; null where there is none. */
 export const topMoves = computed<Moves | null>(() =>
-  summary.value && summary.value.vertices > 0 ? movesOf(summary.value, topLayer.value) : null,
+  outline.value && outline.value.vertices > 0 ? movesOf(outline.value, topLayer.value) : null,
 );
 
 /** Shows these layers, whole. */
@@ -77,7 +77,7 @@ export function showMoves(from: number, to: number): void {
 
 /** Shows everything up to this vertex, as if the print had got there. */
 export function showUpTo(vertex: number): void {
-  const plan = summary.peek();
+  const plan = outline.peek();
   if (!plan) return;
   const layer = Math.max(0, layerOf(plan.layers, vertex) - 1);
   const { last } = movesOf(plan, layer);

@@ -136,6 +136,16 @@ pub struct Preview {
 impl Preview {
     /// A preview for a machine, or of the G-code alone.
     pub fn new(config: Option<&PrinterConfig>) -> Self {
+        Self::with(Checker::new(config), config.and_then(Estimate::new), config)
+    }
+
+    /// A preview that makes the vertices that [`Self::new`] makes for the machine, and nothing that takes longer: no
+    /// times, and nothing of what the machine cannot do.
+    pub fn outline(config: &PrinterConfig) -> Self {
+        Self::with(Checker::reader(config), None, Some(config))
+    }
+
+    fn with(mut checker: Checker, estimate: Option<Estimate>, config: Option<&PrinterConfig>) -> Self {
         let machine = config.map(|config| {
             let [low, high] = [
                 config.steppers.each_ref().map(|axis| axis.position_min.0),
@@ -145,12 +155,11 @@ impl Preview {
         });
         let extruder = config.and_then(|config| config.extruder.as_ref());
         let area = extruder.map_or(FILAMENT_AREA_MM2, crate::config::ExtruderConfig::filament_area_mm2);
-        let mut checker = Checker::new(config);
         checker.show_pictures();
         Self {
             checker,
             encoder: Encoder::new(Grid::around(machine), area),
-            estimate: config.and_then(Estimate::new),
+            estimate,
             input: Vec::new(),
             taken: 0,
             actions: VecDeque::new(),
@@ -263,6 +272,17 @@ impl Preview {
         }
     }
 
+    /// Works on what was fed as [`Self::run`] does, but for what the planner knows alone: vertices, and what belongs to them,
+    /// go to nobody.
+    pub fn run_on(&mut self) -> bool {
+        let mut vertices = Vec::new();
+        let has_more = self.run(&mut vertices);
+        self.encoder.marks.clear();
+        self.encoder.line_steps.clear();
+        self.pictures.take();
+        has_more
+    }
+
     /// Asks for the [planner channels](`Self::take_channels`), before the first byte. Without a machine there are none.
     pub fn want_channels(&mut self) {
         if let Some(estimate) = &mut self.estimate {
@@ -301,12 +321,7 @@ impl Preview {
     /// What the file holds. Works on what is left; its vertices go to nobody.
     pub fn finish(mut self) -> PreviewReport {
         self.end();
-        let mut rest = Vec::new();
-        while self.run(&mut rest) {
-            rest.clear();
-            self.encoder.marks.clear();
-            self.encoder.line_steps.clear();
-        }
+        while self.run_on() {}
         let print_time = self.estimate.as_mut().and_then(Estimate::finish);
         self.checker.add(self.estimate.as_mut().and_then(|estimate| estimate.too_fast.take()));
         let (features, layer_s) = self.totals();

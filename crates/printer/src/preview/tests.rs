@@ -14,7 +14,10 @@ const MACHINE: &str = include_str!("../../../../samples/printer.cfg");
 
 /// Reads a text in pieces of this size.
 fn read(gcode: &[u8], config: Option<&PrinterConfig>, piece: usize) -> (Vec<Vertex>, Vec<u32>, Preview) {
-    let mut preview = Preview::new(config);
+    through(Preview::new(config), gcode, piece)
+}
+
+fn through(mut preview: Preview, gcode: &[u8], piece: usize) -> (Vec<Vertex>, Vec<u32>, Preview) {
     let (mut words, mut marks) = (Vec::new(), Vec::new());
     let mut rest = gcode;
     loop {
@@ -286,6 +289,43 @@ fn a_small_machine_and_a_broken_file() {
     let empty = Preview::new(None).finish();
     assert_eq!((empty.vertices, empty.layers.len()), (0, 1));
     assert!(!empty.check.is_printable());
+}
+
+#[test]
+fn an_outline_is_the_same_geometry_and_what_is_left_is_the_same_plan() {
+    let config = machine();
+    for text in [TEST_PART, SMALL_PART] {
+        let (found, marks, whole) = read(text.as_bytes(), Some(&config), usize::MAX);
+        let whole = whole.finish();
+        let (outlined, outlined_marks, outline) = through(Preview::outline(&config), text.as_bytes(), 10_000);
+        let outline = outline.finish();
+        assert!(outlined == found && outlined_marks == marks);
+        assert_eq!(outline.print_time, None);
+        assert_eq!(outline.check.bounds_mm, whole.check.bounds_mm);
+        let places = |report: &PreviewReport| {
+            report
+                .layers
+                .iter()
+                .map(|layer| (layer.first_vertex, layer.first_line, layer.z))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(places(&outline), places(&whole));
+
+        let mut planned = Preview::new(Some(&config));
+        planned.want_channels();
+        let mut words = 0;
+        for piece in text.as_bytes().chunks(INPUT_BYTES_MAX) {
+            planned.feed(piece);
+            while planned.run_on() {}
+            words += planned.take_channels().len();
+        }
+        planned.end();
+        while planned.run_on() {}
+        words += planned.take_channels().len();
+        assert_eq!(words, whole.vertices as usize * CHANNEL_WORDS);
+        assert_eq!((planned.take_marks(), planned.take_line_steps()), (vec![], vec![]));
+        assert_eq!(planned.finish(), whole);
+    }
 }
 
 #[test]

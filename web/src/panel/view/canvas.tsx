@@ -9,7 +9,7 @@ import { followCursor, lookUp, type Segment } from '../../state/inspect';
 import { isPrinting, isReady, snapshot } from '../../state/machine';
 import { machineSummary, meshInView, surfaceOf } from '../../state/mesh';
 import { stop, toggle } from '../../state/playback';
-import { file, setSink, summary } from '../../state/preview';
+import { file, outline, setSink } from '../../state/preview';
 import { isShown, printedVertex } from '../../state/print';
 import { settings } from '../../state/settings';
 import { isDark } from '../../state/theme';
@@ -205,9 +205,9 @@ function follow(host: ToolpathHost): () => void {
     followPrint(host),
     followNozzle(host),
     followCursor(),
-    // What comes past the page is behind it once the summary is there.
+    // What comes past the page is behind it once the outline or the summary is there.
     effect(() => {
-      if (summary.value) void awaitPicture();
+      if (outline.value) void awaitPicture();
     }),
   ];
   return () => {
@@ -267,7 +267,7 @@ function attachPicking(element: HTMLElement): () => void {
     'pointermove',
     (event) => {
       leave();
-      if (event.pointerType !== 'touch' && event.buttons === 0 && summary.peek())
+      if (event.pointerType !== 'touch' && event.buttons === 0 && outline.peek())
         timer = setTimeout(() => void rest(placeOf(event)), REST_MS);
     },
     { signal: gone },
@@ -279,7 +279,7 @@ function attachPicking(element: HTMLElement): () => void {
       const at = placeOf(event);
       const isClick = pressed && Math.hypot(at.x - pressed.x, at.y - pressed.y) <= CLICK_PX;
       pressed = null;
-      if (isClick && summary.peek()) {
+      if (isClick && outline.peek()) {
         stop();
         void choose(at);
       }
@@ -294,7 +294,7 @@ function attachPicking(element: HTMLElement): () => void {
 
 /** Keys of the view besides those that move it: layers up and down, play, and putting the choice away. */
 function onKey(event: KeyboardEvent): void {
-  if (event.ctrlKey || event.altKey || event.metaKey || !summary.peek()) return;
+  if (event.ctrlKey || event.altKey || event.metaKey || !outline.peek()) return;
   if (event.key === 'PageUp') showLayers(layerFrom.peek(), topLayer.peek() + 1);
   else if (event.key === 'PageDown') {
     const top = Math.max(topLayer.peek() - 1, 0);

@@ -6,7 +6,7 @@ import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import { lineText, textVersion, wantLines } from '../../state/file_text';
 import { lineInView } from '../../state/inspect';
 import { stop } from '../../state/playback';
-import { isTextSlow, linesRead, summary } from '../../state/preview';
+import { isTextSlow, linesRead, outline } from '../../state/preview';
 import { isShown, progress } from '../../state/print';
 import { chooseLine, cursor } from '../../state/view';
 import { formatNumber } from '../numbers';
@@ -159,7 +159,7 @@ export function GcodeText(): JSX.Element {
           value={chosen ?? 1}
           min={1}
           max={Math.max(1, count)}
-          disabled={!summary.value}
+          disabled={!outline.value}
           onSet={(line) => chooseLine(Math.round(line))}
         />
         {isTextSlow.value && (

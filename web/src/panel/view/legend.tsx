@@ -13,7 +13,7 @@ import {
   RAMPS,
 } from '@stepcast/toolpath';
 import type { JSX } from 'preact';
-import { summary } from '../../state/preview';
+import { outline, summary } from '../../state/preview';
 import { change, type Settings, settings } from '../../state/settings';
 import { isDark } from '../../state/theme';
 import {
@@ -47,7 +47,7 @@ const metres = (filament: number): string =>
   filament > 0 && filament < 10 ? '< 0.01 m' : `${formatNumber(filament / 1000, 2)} m`;
 
 function Features(): JSX.Element {
-  const plan = summary.value;
+  const plan = outline.value;
   const features = plan?.features.filter(({ time, filament }) => time > 0 || filament > 0) ?? [];
   const all = features.reduce((sum, { time }) => sum + time, 0);
   return (
@@ -96,7 +96,7 @@ function Features(): JSX.Element {
 
 /** The objects that the file names: each can be hidden, and one made to stand out. */
 export function Objects(): JSX.Element | null {
-  const objects = summary.value?.objects ?? [];
+  const objects = outline.value?.objects ?? [];
   if (objects.length === 0) return null;
   return (
     <ul class="objects" aria-label="Objects">
@@ -133,8 +133,10 @@ export function Objects(): JSX.Element | null {
 function missing(mode: ColourMode): string | null {
   const { found, isWhole } = ranges.value;
   if (PLANNED_MODES.includes(mode) || mode === 'layerTime') {
-    if (summary.value?.time === null) return 'Needs a machine that is in order.';
-    if (!isWhole && PLANNED_MODES.includes(mode)) return 'Computing …';
+    // The planner is still at work.
+    if (!summary.value || (!isWhole && PLANNED_MODES.includes(mode) && summary.value.time !== null))
+      return 'Computing …';
+    if (summary.value.time === null) return 'Needs a machine that is in order.';
   }
   return found[mode] ? null : 'The file does not say.';
 }
@@ -188,7 +190,7 @@ function Scale({ mode }: { readonly mode: ColourMode }): JSX.Element {
 
 /** Those that the file prints with. */
 function Tools(): JSX.Element {
-  const tools = summary.value?.tools ?? [];
+  const tools = outline.value?.tools ?? [];
   if (tools.length === 0) return <p class="hint">The file prints nothing.</p>;
   return (
     <ul class="objects" aria-label="Tools">
@@ -239,7 +241,7 @@ function Meaning({ mode }: { readonly mode: ColourMode }): JSX.Element | null {
   if (mode === 'feature') return <Features />;
   if (mode === 'tool') return <Tools />;
   if (mode === 'object') {
-    return summary.value?.objects.length ? null : <p class="hint">The file names no objects.</p>;
+    return outline.value?.objects.length ? null : <p class="hint">The file names no objects.</p>;
   }
   return <Scale mode={mode} />;
 }
@@ -256,7 +258,7 @@ export function makeRoom(): void {
 }
 
 export function Legend({ isFlat }: { readonly isFlat: boolean }): JSX.Element | null {
-  const plan = summary.value;
+  const plan = outline.value;
   if (!plan) return null;
   const modes = isFlat ? CATEGORICAL_MODES : COLOUR_MODES;
   const mode = modes.includes(settings.value.colourBy) ? settings.value.colourBy : 'feature';

@@ -2,7 +2,7 @@
 import type { JSX } from 'preact';
 import { isPrinting } from '../../state/machine';
 import { isPlaying, playSpeed, SPEEDS, toggle } from '../../state/playback';
-import { summary } from '../../state/preview';
+import { outline } from '../../state/preview';
 import { lineOfLayer } from '../../state/start';
 import { askWhereToBegin } from '../../state/start_request';
 import {
@@ -21,7 +21,7 @@ import { obstacle } from '../obstacle';
 import { Button } from '../parts';
 import { RangeSlider } from './range_slider';
 
-const heightOf = (layer: number): string => formatNumber(summary.value?.layers[layer]?.z ?? 0, 2);
+const heightOf = (layer: number): string => formatNumber(outline.value?.layers[layer]?.z ?? 0, 2);
 
 export function LayerBar(): JSX.Element | null {
   const count = layerCount.value;
@@ -57,7 +57,7 @@ export function LayerBar(): JSX.Element | null {
 
 /** Not while something is printed, and not for all of the file. */
 function FromLayer(): JSX.Element | null {
-  const plan = summary.value;
+  const plan = outline.value;
   const top = topLayer.value;
   if (!plan || layerTo.value === null || top < 1 || isPrinting.value) return null;
   return (

@@ -1,7 +1,7 @@
 // What is known of a segment: all of it for the chosen one, in short for the one under the pointer.
 import type { JSX } from 'preact';
 import { command, type Segment, segment } from '../../state/inspect';
-import { summary } from '../../state/preview';
+import { outline } from '../../state/preview';
 import { cursor } from '../../state/view';
 import { Fact } from '../facts';
 import { machineSummary } from '../machine_summary';
@@ -61,7 +61,7 @@ export function SegmentCard(): JSX.Element | null {
   const of = segment.value;
   if (!of || cursor.value === null) return null;
   const { geometry, line } = of;
-  const object = summary.value?.objects[geometry.object - 1];
+  const object = outline.value?.objects[geometry.object - 1];
   return (
     <section class="segment-card" aria-label="Segment">
       <header>

@@ -4,7 +4,7 @@ import type { JSX } from 'preact';
 import { useState } from 'preact/hooks';
 import { note } from '../../state/log';
 import { notify, withdraw } from '../../state/notices';
-import { file, summary } from '../../state/preview';
+import { file, outline } from '../../state/preview';
 import { change, settings } from '../../state/settings';
 import { pictureOf } from '../../state/view_answers';
 import { save } from '../parts';
@@ -129,7 +129,7 @@ export function ViewTools({ isFlat }: { readonly isFlat: boolean }): JSX.Element
           isOn={followNozzle}
           onSet={(isOn) => change({ followNozzle: isOn })}
         />
-        {summary.value && <Picture />}
+        {outline.value && <Picture />}
         {file.value && (
           <Toggle
             name="G-code"
