@@ -61,7 +61,9 @@ test.describe('dark', () => {
     await panel.closeDialog(dialog);
     await panel.drop(sample('test-part.gcode'));
     await viewer.ready();
+    await viewer.colourBy.selectOption('Layer time');
     await viewer.checkbox('Bed mesh').check();
+    await viewer.drawn();
     await viewer.view.focus();
     for (let times = 0; times < 5; times += 1) await page.keyboard.press('-');
     await viewer.drawn();

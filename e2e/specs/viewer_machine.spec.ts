@@ -8,7 +8,7 @@ const PICTURE_TRIES = 3;
 const PNG_BEGINNING = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
 
 test('the view is turned by buttons and keys, with and without perspective', async ({ panel, page }) => {
-  test.setTimeout(120_000);
+  test.setTimeout(240_000);
   const viewer = new Viewer(page);
   await panel.drop(sample('test-part.gcode'));
   await viewer.ready();
