@@ -9,7 +9,8 @@
 // first_frame_s: until the first picture of some of it is shown. full_frame_s: how long one picture in full detail takes.
 // longest_block_ms: the main thread's longest task by the clock, over load and drawing; …_cpu_ms: by processor time.
 // orbit_fps: pictures a second while the view is turned. slider_upload_bytes: to the GPU, while the layer slider moves;
-// null where there is none. gpu_bytes_per_segment: uploaded for the load. Renderer and GPU process: resident, at rest.
+// null where there is none. gpu_bytes_per_segment: uploaded for the load. Renderer and GPU process: resident, at rest;
+// renderer_peak_mb: the most that it had.
 import { mkdtempSync, readFileSync, rmSync, statSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -100,9 +101,9 @@ async function blocksOf(browser, act) {
   return { longest_block_ms: longest(({ dur }) => dur), longest_block_cpu_ms: longest(({ tdur }) => tdur) };
 }
 
-function residentMb(pid) {
+function residentMb(pid, field = 'VmRSS') {
   try {
-    return Math.round((Number(/^VmRSS:\s+(\d+)/m.exec(readFileSync(`/proc/${pid}/status`, 'utf8'))?.[1]) * 1024) / MB);
+    return Math.round((Number(new RegExp(`^${field}:\\s+(\\d+)`, 'm').exec(readFileSync(`/proc/${pid}/status`, 'utf8'))?.[1]) * 1024) / MB);
   } catch {
     // Only Linux tells.
     return null;
@@ -113,8 +114,8 @@ async function memory(browser, page) {
   const session = await browser.newBrowserCDPSession();
   const { processInfo } = await session.send('SystemInfo.getProcessInfo');
   await session.detach();
-  const of = (type) => {
-    const found = processInfo.filter((one) => one.type === type).map(({ id }) => residentMb(id));
+  const of = (type, field) => {
+    const found = processInfo.filter((one) => one.type === type).map(({ id }) => residentMb(id, field));
     return found.length === 0 || found.includes(null) ? null : Math.max(...found);
   };
   const ours = await page.context().newCDPSession(page);
@@ -122,7 +123,7 @@ async function memory(browser, page) {
   const { metrics } = await ours.send('Performance.getMetrics');
   await ours.detach();
   const heap = metrics.find(({ name }) => name === 'JSHeapUsedSize')?.value ?? 0;
-  return { js_heap_mb: Math.round(heap / MB), renderer_rss_mb: of('renderer'), gpu_process_rss_mb: of('GPU') };
+  return { js_heap_mb: Math.round(heap / MB), renderer_rss_mb: of('renderer'), renderer_peak_mb: of('renderer', 'VmHWM'), gpu_process_rss_mb: of('GPU') };
 }
 
 const rounded = (value, digits = 3) => (Number.isFinite(value) ? Number(value.toFixed(digits)) : null);
@@ -258,7 +259,7 @@ async function measure(viewer, urls, file) {
 /** Ours by each other's; what is missing on either side is left out. */
 function ratios(results) {
   const [ours, ...others] = results;
-  const names = ['load_s', 'first_frame_s', 'full_frame_s', 'longest_block_ms', 'orbit_fps', 'gpu_bytes_per_segment', 'renderer_rss_mb'];
+  const names = ['load_s', 'first_frame_s', 'full_frame_s', 'longest_block_ms', 'orbit_fps', 'gpu_bytes_per_segment', 'renderer_rss_mb', 'renderer_peak_mb'];
   return others.filter(({ failed }) => !failed).map((other) => {
     const known = names.filter((name) => Number.isFinite(ours[name]) && other[name] > 0);
     return { to: other.viewer, ...Object.fromEntries(known.map((name) => [name, rounded(ours[name] / other[name])])) };
@@ -291,6 +292,8 @@ async function main(given) {
         results.push(await measure(viewer, urls, file));
       }
       report.push({ file_mb: rounded(statSync(file).size / MB, 1), viewers: results, ratios: ratios(results) });
+      // What is known is not lost if a later one is broken off.
+      process.stderr.write(`${JSON.stringify(report.at(-1))}\n`);
     }
     console.log(JSON.stringify(report, null, 2));
   } finally {

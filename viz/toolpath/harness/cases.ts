@@ -170,6 +170,7 @@ export const CASES: Readonly<Record<string, Case>> = {
   'hidden-object': valueCase((host) => host.show({ hiddenObjects: [3] })),
   'marked-object': valueCase((host) => host.setHighlightedObject(2)),
   'marked-segment': valueCase((host) => host.setHighlight(302)),
+  'out-of-round': valueCase((host) => host.setVolume({ min: [2, -5, 0], max: [22, 20, 8], isRound: true })),
   'out-of-volume': valueCase((host) => host.setVolume({ min: [2, -5, 0], max: [22, 20, 1.6] })),
   orthographic: valueCase((host) => {
     host.setProjection('orthographic');

@@ -123,6 +123,15 @@ export interface Ray {
 export const pixelAngle = (camera: CameraState, size: ViewSize): number =>
   mmPerPx(camera, size) / eyeDistanceMm(camera);
 
+/** What a pixel covers of the nearest part of a box, `ratio` of them being a CSS pixel; 0 where the eye is in or beside it. */
+export function finestPx(camera: CameraState, size: ViewSize, ratio: number, box: BoxMm): Mm {
+  const scale = mmPerPx(camera, size) / ratio;
+  if (camera.projection === 'orthographic') return scale;
+  const { eyeMm, forward } = eyeFrame(camera);
+  const nearest = Math.min(...corners(box).map((corner) => dot(along(corner, [-1, eyeMm]), forward)));
+  return (scale * Math.max(nearest, 0)) / eyeDistanceMm(camera);
+}
+
 /** Whether both show the same. */
 export function isSameCamera(one: CameraState, other: CameraState): boolean {
   const { targetMm: to, ...rest } = other;

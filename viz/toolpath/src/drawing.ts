@@ -6,8 +6,8 @@
  */
 import { Scene } from 'three';
 import { BedObjects } from './bed';
-import { type BoxMm, type CameraState, pixelAngle, unionOf, type ViewSize } from './camera';
-import type { RoughList } from './coarse';
+import { type BoxMm, type CameraState, finestPx, pixelAngle, unionOf, type ViewSize } from './camera';
+import { type RoughList, TOLERANCE_MM } from './coarse';
 import type { ColourMode, ColourRanges } from './colours';
 import type { Content } from './content';
 import { SmoothChoice } from './detail';
@@ -18,7 +18,7 @@ import { cut, lengthOf, type VertexRange } from './layers';
 import { NozzleObject } from './nozzle';
 import { featureMask, type Palette } from './palette';
 import { beadsOf, listedBeadsOf, PathObjects } from './path';
-import { ALL_PRINTED } from './path_uniforms';
+import { ALL_PRINTED, type Volume } from './path_uniforms';
 import { type Shown, shownRanges } from './shown';
 import { Stage, type Surface } from './stage';
 import { SurfaceObject } from './surface';
@@ -40,8 +40,20 @@ export interface Model {
   /** The user's own. */
   limits: ColourRanges;
   object: number | null;
-  volume: BoxMm | null;
+  volume: Volume | null;
 }
+
+/** A part of a full picture: items in order, drawn in pieces. */
+interface Pass {
+  readonly ranges: readonly VertexRange[];
+  readonly draw: (surface: Surface, part: VertexRange) => void;
+}
+
+/**
+ * Where a pixel covers more than this, a full picture is drawn from the coarse path, which is nowhere so far off: nobody sees
+ * the difference, but large files take a third of the time.
+ */
+const FINE_PX_MM = 1.5 * TOLERANCE_MM;
 
 /** How far a full picture is. */
 export interface Progress {
@@ -51,8 +63,10 @@ export interface Progress {
   readonly size: ViewSize;
   readonly ratio: number;
   readonly ranges: readonly VertexRange[];
-  phase: 'beads' | 'lines' | 'done';
-  /** Vertices of the ranges that the phase has done. */
+  readonly passes: readonly Pass[];
+  /** The one that is under way; behind the last, the picture is complete. */
+  pass: number;
+  /** Items of its ranges that are done. */
   at: number;
   /** The printed limit that the picture was drawn with. */
   printed: number;
@@ -77,6 +91,8 @@ export class Drawing implements Painter {
   };
   readonly #paths = [this.#fine, this.#coarse.outer, this.#coarse.inner];
   readonly #bedScene = new Scene();
+  /** Chunks of channels that are on the GPU. */
+  #uploaded = 0;
   #progress: Progress | null = null;
   readonly #onStale: () => void;
 
@@ -96,6 +112,10 @@ export class Drawing implements Painter {
       for (const surface of ['canvas', 'picture'] as const) this.stage.draw(surface, path.scene);
       path.hide();
     }
+    // Out of sight: the picture is cleared before it is begun.
+    this.highlight.set({ from: [0, 0, 0], to: [0, 0, 0], widthMm: 0, heightMm: 0 });
+    this.stage.draw('picture', this.highlight.scene);
+    this.highlight.set(null);
   }
 
   set palette(palette: Palette) {
@@ -111,6 +131,7 @@ export class Drawing implements Painter {
   empty(): void {
     for (const path of this.#paths) path.clear();
     this.#textures.clear();
+    this.#uploaded = 0;
     this.layerTimes.clear();
     this.#progress = null;
   }
@@ -119,6 +140,7 @@ export class Drawing implements Painter {
   lost(): void {
     for (const path of this.#paths) path.release();
     this.#textures.clear();
+    this.#uploaded = 0;
     this.layerTimes.clear();
     this.bed.clear();
     this.surface.release();
@@ -139,7 +161,9 @@ export class Drawing implements Painter {
   }
 
   fullSegments(): number {
-    return lengthOf(this.ranges()) * (this.#linesShown() ? 2 : 1);
+    const { camera } = this.#model;
+    const passes = this.#passes(this.ranges(), this.#isFine(camera, this.stage.size, this.stage.ratio));
+    return passes.reduce((sum, { ranges }) => sum + lengthOf(ranges), 0);
   }
 
   drawQuick(budget: number): number {
@@ -175,9 +199,19 @@ export class Drawing implements Painter {
     if (!progress || to === ALL_PRINTED || progress.printed === ALL_PRINTED || to < progress.printed)
       return false;
     this.#look(progress.camera, progress.size, progress.ratio);
-    this.#fine.uniforms.printed = to;
-    for (const { first, end } of progress.ranges) {
-      this.#beads('picture', { first: Math.max(progress.printed, first), end: Math.min(to, end) });
+    const printed = progress.ranges.flatMap(({ first, end }): VertexRange[] => {
+      const now = { first: Math.max(progress.printed, first), end: Math.min(to, end) };
+      return now.end > now.first ? [now] : [];
+    });
+    for (const path of this.#paths) {
+      path.uniforms.printed = to;
+      path.uniforms.heightScale = 1;
+    }
+    // Of the same beads as the picture, and of nothing that lies over them.
+    const isFine = this.#isFine(progress.camera, progress.size, progress.ratio);
+    const [beads, others] = this.#passes(printed, isFine);
+    for (const pass of isFine ? [beads] : [beads, others]) {
+      for (const range of pass?.ranges ?? []) pass?.draw('picture', range);
     }
     progress.printed = to;
     this.overlay();
@@ -205,33 +239,81 @@ export class Drawing implements Painter {
     const { content, printed } = this.#model;
     this.#look(camera, size, ratio);
     this.#clear(surface);
-    if (content) this.#fine.sync(content.store.chunks, content.channels.chunks);
-    return { surface, camera, size, ratio, ranges: this.ranges(), phase: 'beads', at: 0, printed };
+    if (content) {
+      const { store, channels, rough } = content;
+      this.#fine.sync(store.chunks, channels.chunks);
+      this.#coarse.outer.sync(store.chunks, channels.chunks, rough.outer.segments);
+      this.#coarse.inner.sync(store.chunks, channels.chunks, rough.inner.segments);
+    }
+    const ranges = this.ranges();
+    const passes = this.#passes(ranges, this.#isFine(camera, size, ratio));
+    return { surface, camera, size, ratio, ranges, passes, pass: 0, at: 0, printed };
   }
 
   /** Goes on with a full picture by about so many segments. */
   goOn(progress: Progress, budget: number): Drawn {
-    const { surface, ranges } = progress;
+    const { surface, passes } = progress;
     this.#look(progress.camera, progress.size, progress.ratio);
-    this.#apply(this.#fine);
-    this.#fine.uniforms.printed = progress.printed;
-    const total = lengthOf(ranges);
+    for (const path of this.#paths) {
+      this.#apply(path);
+      path.uniforms.printed = progress.printed;
+      path.uniforms.heightScale = 1;
+    }
     let left = Math.max(budget, 1);
     let segments = 0;
-    while (left > 0 && progress.phase !== 'done') {
+    for (let pass = passes[progress.pass]; pass && left > 0; pass = passes[progress.pass]) {
+      const total = lengthOf(pass.ranges);
       const count = Math.min(left, total - progress.at);
-      for (const part of cut(ranges, progress.at, count)) {
-        if (progress.phase === 'beads') this.#beads(surface, part);
-        else this.#lines(surface, part);
-      }
+      for (const part of cut(pass.ranges, progress.at, count)) pass.draw(surface, part);
       segments += count;
       left -= Math.max(count, 1);
       progress.at += count;
       if (progress.at < total) continue;
-      progress.phase = progress.phase === 'beads' && this.#linesShown() ? 'lines' : 'done';
+      progress.pass += 1;
       progress.at = 0;
     }
-    return { segments, complete: progress.phase === 'done' };
+    return { segments, complete: progress.pass >= passes.length };
+  }
+
+  /** Whether a pixel is so small that it takes the path as it is. */
+  #isFine(camera: CameraState, size: ViewSize, ratio: number): boolean {
+    const box = this.#model.content?.store.boxOfAll();
+    return !box || finestPx(camera, size, ratio, box) < FINE_PX_MM;
+  }
+
+  /** What a full picture of these vertices is made of. */
+  #passes(ranges: readonly VertexRange[], isFine: boolean): Pass[] {
+    const { content } = this.#model;
+    const passes: Pass[] = [];
+    if (!content) return passes;
+    const { outer, inner } = content.rough;
+    if (isFine) passes.push({ ranges, draw: (surface, part) => this.#beads(surface, part) });
+    else
+      passes.push(
+        this.#listed(this.#coarse.outer, outer, ranges),
+        this.#listed(this.#coarse.inner, inner, ranges),
+      );
+    if (this.#linesShown()) passes.push({ ranges, draw: (surface, part) => this.#lines(surface, part) });
+    return passes;
+  }
+
+  #listed(path: PathObjects, { segments }: RoughList, ranges: readonly VertexRange[]): Pass {
+    return {
+      ranges: ranges.map((range) => segments.within(range)),
+      draw: (surface, part) => {
+        path.showBeads(segments.split(part).map(listedBeadsOf));
+        this.stage.draw(surface, path.scene);
+      },
+    };
+  }
+
+  /** Brings channels to the GPU whose chunk is whole: one by one as they come, for all at once would hold up a picture. */
+  uploadChannels(): void {
+    const { chunks } = this.#model.content?.channels ?? { chunks: [] };
+    for (; this.#uploaded < chunks.length - 1; this.#uploaded++) {
+      const chunk = chunks[this.#uploaded];
+      if (chunk) this.stage.upload(this.#textures.channels(this.#uploaded, chunk));
+    }
   }
 
   /** Sets the camera and what depends on it. */

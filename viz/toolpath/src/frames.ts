@@ -40,12 +40,15 @@ export interface Painter {
 }
 
 export interface FrameReport {
-  readonly kind: 'quick' | 'full' | 'patch' | 'overlay';
+  /** 'part': a full picture is under way, out of sight; told where it takes long. */
+  readonly kind: 'quick' | 'part' | 'full' | 'patch' | 'overlay';
   readonly segments: number;
   /** From the first command until the GPU was done; for a full picture the longest slice. */
   readonly longestMs: Ms;
   /** From the beginning of the picture to its end. */
   readonly totalMs: Ms;
+  /** Of the picture, 0 … 1; all of it but for parts. */
+  readonly share: number;
   /** Another picture follows: this one is not what was asked for last, or not in full detail. */
   readonly more: boolean;
 }
@@ -55,6 +58,8 @@ const REST_MS = 140;
 /** The same after more of a file has come. */
 const GROWTH_REST_MS = 1500;
 const POLL_MS = 2;
+/** How far a full picture is is told this often. */
+const PART_MS = 500;
 /** A GPU that is silent for so long has lost its context or is stuck: the loop goes on. */
 const FENCE_MAX_MS = 10_000;
 
@@ -81,6 +86,7 @@ export class FrameLoop {
   #pictureBegan: Ms = 0;
   #pictureSegments = 0;
   #longest: Ms = 0;
+  #partTold: Ms = -Infinity;
   #resting: (() => void)[] = [];
 
   constructor(painter: Painter, clock: FrameClock, report: (report: FrameReport) => void) {
@@ -220,7 +226,7 @@ export class FrameLoop {
     this.#await(began, (elapsed) => {
       this.#fullBudget.measured(segments, elapsed);
       this.#longest = Math.max(this.#longest, elapsed);
-      if (!complete) return;
+      if (!complete) return this.#tellPart();
       const totalMs = this.#clock.now() - this.#pictureBegan;
       this.#tell({ kind: 'full', segments: this.#pictureSegments, longestMs: this.#longest, totalMs });
     });
@@ -234,8 +240,18 @@ export class FrameLoop {
     return this.#picture === 'complete' && !this.#isWanted() && this.#timer === null;
   }
 
-  #tell(report: Omit<FrameReport, 'more'>): void {
-    this.#report({ ...report, more: this.#isWanted() || this.#timer !== null });
+  /** Now and then, how far the full picture is. */
+  #tellPart(): void {
+    const now = this.#clock.now();
+    if (now - Math.max(this.#partTold, this.#pictureBegan) < PART_MS) return;
+    this.#partTold = now;
+    const [segments, longestMs] = [this.#pictureSegments, this.#longest];
+    const share = Math.min(segments / Math.max(this.#painter.fullSegments(), 1), 1);
+    this.#tell({ kind: 'part', segments, longestMs, totalMs: now - this.#pictureBegan, share });
+  }
+
+  #tell(report: Omit<FrameReport, 'more' | 'share'> & { readonly share?: number }): void {
+    this.#report({ share: 1, ...report, more: this.#isWanted() || this.#timer !== null });
     if (!this.#isAtRest()) return;
     for (const callback of this.#resting.splice(0)) callback();
   }

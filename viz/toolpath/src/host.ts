@@ -5,12 +5,13 @@
  */
 
 import type { Bed } from './bed';
-import type { BoxMm, CameraPreset, CameraState, Projection, Vec3 } from './camera';
+import type { CameraPreset, CameraState, Projection, Vec3 } from './camera';
 import type { ColourMode, ValueRange } from './colours';
 import type { Layer } from './layers';
 import type { BedMesh } from './mesh';
 import { carryOut, type View, type ViewEvent, type ViewRequest, type WorkerRequest } from './messages';
 import type { Theme } from './palette';
+import type { Volume } from './path_uniforms';
 import type { PictureSizePx } from './picture';
 import type { Shown } from './shown';
 import { Source } from './source';
@@ -120,7 +121,7 @@ export class ToolpathHost {
     this.send({ type: 'setHighlightedObject', object });
   }
   /** What lies outside gets a warning's tint; null: there are no limits. */
-  setVolume(box: BoxMm | null): void {
+  setVolume(box: Volume | null): void {
     this.send({ type: 'setVolume', box });
   }
   setMesh(mesh: BedMesh | null): void {

@@ -5,12 +5,13 @@
  * worker that makes vertices, see source.ts), so that they do not pass through the main thread.
  */
 import type { Bed } from './bed';
-import type { BoxMm, CameraPreset, CameraState, Projection, Vec3 } from './camera';
+import type { CameraPreset, CameraState, Projection, Vec3 } from './camera';
 import type { ColourMode, ColourRanges, ValueRange } from './colours';
 import type { FrameReport } from './frames';
 import type { Layer } from './layers';
 import type { BedMesh } from './mesh';
 import type { Theme } from './palette';
+import type { Volume } from './path_uniforms';
 import type { PictureSizePx } from './picture';
 import type { Shown } from './shown';
 import type { CssPx, VertexIndex } from './units';
@@ -35,7 +36,7 @@ export type ViewRequest =
   | { readonly type: 'setNozzle'; readonly at: Vec3 | null }
   | { readonly type: 'setHighlight'; readonly vertex: VertexIndex | null }
   | { readonly type: 'setHighlightedObject'; readonly object: number | null }
-  | { readonly type: 'setVolume'; readonly box: BoxMm | null }
+  | { readonly type: 'setVolume'; readonly box: Volume | null }
   | { readonly type: 'setMesh'; readonly mesh: BedMesh | null }
   | { readonly type: 'pick'; readonly x: CssPx; readonly y: CssPx; readonly id: number }
   | { readonly type: 'picture'; readonly id: number; readonly size: PictureSizePx }

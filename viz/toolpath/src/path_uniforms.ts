@@ -11,6 +11,11 @@ import type { VertexHeader } from './vertex';
 
 /** A vertex that no file reaches: everything is printed. */
 export const ALL_PRINTED = 0xffff_ffff;
+/** What the machine reaches: a box, or the upright cylinder (over an ellipse) in it. */
+export interface Volume extends BoxMm {
+  readonly isRound?: boolean;
+}
+
 /** Farther than any machine reaches. */
 const ENDLESS_MM = 1e9;
 const MARKER_PX = 6;
@@ -56,6 +61,7 @@ export class PathUniforms {
     uMarkerPx: { value: MARKER_PX },
     uVolumeMin: { value: [0, 0, 0] },
     uVolumeMax: { value: [0, 0, 0] },
+    uVolumeRadii: { value: [0, 0] },
     ...Object.fromEntries(Object.keys(COLOURS).map((name) => [name, { value: [0, 0, 0] }])),
   };
 
@@ -127,10 +133,13 @@ export class PathUniforms {
     this.set('uHeightScale', scale);
   }
 
-  set volume(box: BoxMm | null) {
+  set volume(box: Volume | null) {
     const limit = (value: number): number => Math.min(Math.max(value, -ENDLESS_MM), ENDLESS_MM);
     this.set('uVolumeMin', (box?.min ?? [-ENDLESS_MM, -ENDLESS_MM, -ENDLESS_MM]).map(limit));
     this.set('uVolumeMax', (box?.max ?? [ENDLESS_MM, ENDLESS_MM, ENDLESS_MM]).map(limit));
+    // By more than positions are rounded.
+    const radius = (axis: 0 | 1): number => (box?.isRound ? (box.max[axis] - box.min[axis]) / 2 + 0.01 : 0);
+    this.set('uVolumeRadii', [radius(0), radius(1)]);
   }
 
   /** Pixels of the drawing buffer: what one covers a millimetre away, and how many make a CSS pixel. */

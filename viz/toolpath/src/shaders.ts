@@ -37,6 +37,8 @@ uniform uint uPrinted;
 /** What may be reached. */
 uniform vec3 uVolumeMin;
 uniform vec3 uVolumeMax;
+/** From the box' middle to its sides, where the volume is the cylinder in it; 0: it is the box. */
+uniform vec2 uVolumeRadii;
 uniform vec3 uWarning;
 
 const uint TRAVEL = ${FLAGS.travel}u;
@@ -55,6 +57,11 @@ uint featureOf(uvec4 v) {
 }
 /** True if one end lies outside, by more than positions are rounded. */
 bool leavesVolume(vec3 from, vec3 to) {
+  if (uVolumeRadii.x > 0.0) {
+    vec2 middle = 0.5 * (uVolumeMin.xy + uVolumeMax.xy);
+    float away = max(length((from.xy - middle) / uVolumeRadii), length((to.xy - middle) / uVolumeRadii));
+    if (away > 1.0) return true;
+  }
   return any(lessThan(min(from, to), uVolumeMin - 0.01)) || any(greaterThan(max(from, to), uVolumeMax + 0.01));
 }
 /** A place that is clipped away. */

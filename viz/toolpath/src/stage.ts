@@ -17,6 +17,7 @@ import {
   PerspectiveCamera,
   RawShaderMaterial,
   Scene,
+  type Texture,
   UnsignedByteType,
   WebGLRenderer,
   WebGLRenderTarget,
@@ -164,6 +165,11 @@ export class Stage {
   /** The context is lost: lets go of its buffers, which come anew when they are next used. */
   lost(): void {
     this.#picture.dispose();
+  }
+
+  /** Brings a texture to the GPU before it is drawn from. */
+  upload(texture: Texture): void {
+    if (!this.isLost) this.renderer.initTexture(texture);
   }
 
   /** Shows the full picture. */

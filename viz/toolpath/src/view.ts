@@ -7,7 +7,6 @@
  */
 import { type Bed, bedBox, isBed } from './bed';
 import {
-  type BoxMm,
   type CameraPreset,
   type CameraState,
   DEFAULT_CAMERA,
@@ -29,7 +28,7 @@ import type { Layer } from './layers';
 import { type BedMesh, isMesh } from './mesh';
 import type { ViewEvent } from './messages';
 import { PALETTES, type Palette, type Theme } from './palette';
-import { ALL_PRINTED } from './path_uniforms';
+import { ALL_PRINTED, type Volume } from './path_uniforms';
 import { PictureMaker, type PictureSizePx } from './picture';
 import { segmentAt } from './segment';
 import { SHOW_ALL, type Shown, validRange } from './shown';
@@ -139,6 +138,7 @@ export class ToolpathView {
   /** Planner channels of the next vertices that have none yet, four words each; the array is copied. */
   appendChannels(words: Uint32Array): void {
     this.#model.content?.appendChannels(words);
+    this.#drawing.uploadChannels();
     this.#tellRanges();
     if (isPlanned(this.#model.mode)) this.#hasGrown();
   }
@@ -228,7 +228,7 @@ export class ToolpathView {
   }
 
   /** What lies outside gets a warning's tint; null: there are no limits. */
-  setVolume(box: BoxMm | null): void {
+  setVolume(box: Volume | null): void {
     this.#model.volume = box && [...box.min, ...box.max].some(Number.isNaN) ? null : box;
     this.#loop.moved();
   }

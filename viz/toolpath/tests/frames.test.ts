@@ -189,6 +189,35 @@ describe('the budget', () => {
   });
 });
 
+describe('pictures of large files', () => {
+  test('how far a full picture is is told now and then, and what it was in the end', () => {
+    const { clock, loop, reports } = setUp(5_000_000, 0.001);
+    loop.moved();
+    clock.run(20_000);
+    const parts = reports.filter(({ kind }) => kind === 'part');
+    expect(parts.length).toBeGreaterThan(5);
+    const shares = parts.map(({ share }) => share);
+    expect([...shares].sort((one, other) => one - other)).toEqual(shares);
+    expect(shares[0]).toBeLessThan(0.2);
+    expect(parts.every(({ more, share }) => more && share < 1)).toBe(true);
+    expect(reports.at(-1)).toMatchObject({ kind: 'full', share: 1, more: false });
+  });
+
+  test('while a file grows no full picture is begun', () => {
+    const { clock, loop, reports } = setUp(1_000_000, 0.001);
+    for (let step = 0; step < 10; step++) {
+      loop.grew();
+      clock.run(clock.time + 1000);
+    }
+    expect(reports.every(({ kind }) => kind === 'quick')).toBe(true);
+    expect(reports.length).toBeGreaterThan(8);
+    loop.moved();
+    clock.run(clock.time + 3000);
+    expect(reports.at(-1)).toMatchObject({ kind: 'full' });
+    expect(clock.idle).toBe(true);
+  });
+});
+
 describe('several samples a pixel', () => {
   test('are given up where they take long, and come back where that was not their fault', () => {
     const choice = new SmoothChoice();

@@ -6,7 +6,7 @@ import { Icon } from './icons';
 import { formatNumber } from './numbers';
 import { openSample, pickFile } from './open_file';
 import { Button } from './parts';
-import { Canvas, isFlat, viewFailure } from './view/canvas';
+import { Canvas, drawnShare, isFlat, viewFailure } from './view/canvas';
 import { GcodeText } from './view/gcode_text';
 import { Legend } from './view/legend';
 import { LayerBar, MoveBar } from './view/range_bars';
@@ -52,6 +52,13 @@ function Short(): JSX.Element | null {
   );
 }
 
+/** What is seen is a rough picture; the full one is being drawn behind it, and that takes a while. */
+function Drawing(): JSX.Element | null {
+  const share = drawnShare.value;
+  if (share === null) return null;
+  return <p class="view-short">Full picture: {Math.floor(100 * share)} %</p>;
+}
+
 function Empty(): JSX.Element {
   return (
     <div class="empty">
@@ -83,6 +90,7 @@ export function Viewer(): JSX.Element {
           <div class="over-left">
             {viewFailure.value && <NoView reason={viewFailure.value} />}
             {hasView && <Short />}
+            {hasView && <Drawing />}
             {hasView && <ViewTools isFlat={isFlat.value} />}
           </div>
           {outline.value && hasView && (

@@ -50,6 +50,8 @@ async function awaitPicture(): Promise<void> {
   isDrawing.value = false;
 }
 
+/** How far the full picture is, 0 … 1, where it takes long; null otherwise. */
+export const drawnShare = signal<number | null>(null);
 /** The view that is there, for the buttons over it. */
 export const view = signal<ToolpathHost | null>(null);
 /** What the pointer rests on, and where in the view. */
@@ -127,7 +129,11 @@ function followMachine(host: ToolpathHost): () => void {
         ? { minMm: [x.min, y.min], maxMm: [x.max, y.max] }
         : { minMm: [-radius, -radius], maxMm: [radius, radius], isRound: true },
     );
-    host.setVolume({ min: [x.min, y.min, z?.min ?? 0], max: [x.max, y.max, z?.max ?? Infinity] });
+    host.setVolume({
+      min: [x.min, y.min, z?.min ?? 0],
+      max: [x.max, y.max, z?.max ?? Infinity],
+      ...(radius === null ? {} : { isRound: true }),
+    });
     if (!file.peek()) host.fit();
   });
 }
@@ -221,6 +227,7 @@ function take(event: ViewEvent): void {
     viewFailure.value = event.reason;
     isFlat.value = event.isFlat;
   }
+  if (event.type === 'frame') drawnShare.value = event.report.kind === 'part' ? event.report.share : null;
   if (event.type === 'ranges') ranges.value = { found: event.ranges, isWhole: event.isWhole };
 }
 
