@@ -5,13 +5,13 @@ import type { Page } from '@playwright/test';
 import { root } from '../../scripts/lib/target.mjs';
 import { expect, test } from '../fixtures/test.ts';
 import { type Panel, sample } from '../pages/panel.ts';
+import { Viewer } from '../pages/viewer.ts';
 
 const picture = (name: string): string => join(root, 'docs', 'pictures', `${name}.png`);
 
 async function drawn(panel: Panel): Promise<void> {
-  // The 3D view sharpens once nothing moves; nothing in the page tells of that.
   await expect(panel.preview.getByRole('progressbar')).toHaveCount(0);
-  await panel.page.waitForTimeout(2000);
+  await new Viewer(panel.page).drawn();
 }
 
 async function take(page: Page, panel: Panel, name: string): Promise<void> {

@@ -1,4 +1,5 @@
 // What the view is coloured by, what the colours mean, and which features are there at all.
+import { readFileSync } from 'node:fs';
 import { expect, test } from '../fixtures/files.ts';
 import { sample } from '../pages/panel.ts';
 import { Viewer } from '../pages/viewer.ts';
@@ -13,6 +14,9 @@ const MODES = [
   'Actual flow',
   'Layer time',
 ] as const;
+
+/** The planner is at work on it for a while. */
+const LARGE_BYTES = 12e6;
 
 test('features have their shares of time and filament, and can be taken away', async ({ panel, page }) => {
   const viewer = new Viewer(page);
@@ -99,6 +103,20 @@ test('temperature, fan and tools have the colours of what the file sets', async 
   await expectNew('tool');
 });
 
+test('what the planner has not worked out yet is said to be computing', async ({ panel, page, makeFile }) => {
+  test.setTimeout(120_000);
+  const viewer = new Viewer(page);
+  await panel.drop(sample('test-part-small.gcode'));
+  await viewer.ready();
+  await viewer.colourBy.selectOption('Acceleration');
+  const part = readFileSync(sample('test-part-small.gcode'), 'utf8');
+  await panel.look(makeFile('large.gcode', part.repeat(Math.ceil(LARGE_BYTES / part.length))));
+  const said = viewer.legend.getByRole('status');
+  await expect(said).toHaveText('Computing …');
+  await expect(said).toHaveText('', { timeout: 90_000 });
+  await expect(viewer.legend.getByRole('textbox', { name: /^Greatest/ })).not.toHaveValue('0');
+});
+
 test('the scale has the colours that the view has in its theme', async ({ panel, page }) => {
   const viewer = new Viewer(page);
   await panel.drop(sample('test-part-small.gcode'));
@@ -124,7 +142,7 @@ test('the choice is kept for the next visit', async ({ panel, page }) => {
   await expect(viewer.colourBy).toHaveValue('width');
 });
 
-/** Beads of two tools, hotter and with the fan on from the second on. */
+/** Three beads: hotter from the second on, with the fan and another tool from the third on. */
 const TWO_TOOLS = `G28
 G90
 M82
@@ -140,8 +158,8 @@ G1 Z0.2 F600
 G1 X90 Y90 F6000
 G1 X110 Y90 E10 F1200
 M104 S230
-M106 S255
 G1 X110 Y110 E20
+M106 S255
 T2
 G1 X90 Y110 E30
 M107

@@ -8,7 +8,7 @@ const PICTURE_TRIES = 3;
 const PNG_BEGINNING = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
 
 test('the view is turned by buttons and keys, with and without perspective', async ({ panel, page }) => {
-  test.setTimeout(120_000);
+  test.setTimeout(240_000);
   const viewer = new Viewer(page);
   await panel.drop(sample('test-part.gcode'));
   await viewer.ready();
@@ -33,6 +33,24 @@ test('the view is turned by buttons and keys, with and without perspective', asy
     await page.keyboard.press(key);
     await expectNew(key);
   }
+});
+
+test('the part stays in view as long as nobody has come nearer', async ({ panel, page }) => {
+  test.setTimeout(90_000);
+  const viewer = new Viewer(page);
+  await panel.drop(sample('test-part.gcode'));
+  await viewer.ready();
+  const legend = viewer.legend.getByText('Colours', { exact: true });
+  const beside = await viewer.picture();
+  await viewer.view.focus();
+  await page.keyboard.press('Home');
+  expect((await viewer.picture()).equals(beside), 'beside the legend').toBe(true);
+  await legend.focus();
+  await page.keyboard.press('Enter');
+  const alone = await viewer.picture();
+  await viewer.view.focus();
+  await page.keyboard.press('Home');
+  expect((await viewer.picture()).equals(alone), 'without the legend').toBe(true);
 });
 
 test('a picture of the view is kept as PNG', async ({ panel, page }) => {

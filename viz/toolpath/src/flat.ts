@@ -60,6 +60,8 @@ export class FlatView implements View {
   #palette: Palette = PALETTES.light;
   #mode: ColourMode = 'feature';
   #bed: Bed | null = null;
+  /** All of it is in view, and is to stay so. */
+  #isFitted = false;
   #place: Place = { atMm: [0, 0], scale: 2 };
   #size: ViewSizePx = { width: 1, height: 1, ratio: 1 };
   #nozzle: Vec3 | null = null;
@@ -135,8 +137,10 @@ export class FlatView implements View {
 
   setNozzle(at: Vec3 | null): void {
     this.#nozzle = at?.every(Number.isFinite) ? at : null;
-    if (this.#nozzle && this.#follows)
+    if (this.#nozzle && this.#follows) {
       this.#place = { ...this.#place, atMm: [this.#nozzle[0], this.#nozzle[1]] };
+      this.#isFitted = false;
+    }
     this.#restart();
   }
 
@@ -174,6 +178,7 @@ export class FlatView implements View {
   pan(dx: CssPx, dy: CssPx): void {
     const { atMm, scale } = this.#place;
     this.#place = { scale, atMm: [atMm[0] - dx / scale, atMm[1] + dy / scale] };
+    this.#isFitted = false;
     this.#restart();
   }
 
@@ -183,6 +188,7 @@ export class FlatView implements View {
     const next = Math.min(Math.max(scale / factor, SCALE_MIN), SCALE_MAX);
     const shift = 1 / scale - 1 / next;
     this.#place = { scale: next, atMm: [atMm[0] + at[0] * shift, atMm[1] - at[1] * shift] };
+    this.#isFitted = false;
     this.#restart();
   }
 
@@ -194,6 +200,7 @@ export class FlatView implements View {
       MARGIN * Math.min(this.#size.width / Math.max(width, 1), this.#size.height / Math.max(height, 1));
     const middle = (axis: 0 | 1): number => (box.min[axis] + box.max[axis]) / 2;
     this.#place = { scale: Math.min(Math.max(scale, SCALE_MIN), SCALE_MAX), atMm: [middle(0), middle(1)] };
+    this.#isFitted = true;
     this.#restart();
   }
 
@@ -205,7 +212,8 @@ export class FlatView implements View {
     this.#size = size;
     this.#canvas.width = Math.max(1, Math.round(size.width * size.ratio));
     this.#canvas.height = Math.max(1, Math.round(size.height * size.ratio));
-    this.#restart();
+    if (this.#isFitted) this.fit();
+    else this.#restart();
   }
 
   slice(first: VertexIndex, end: VertexIndex, id: number): void {

@@ -82,6 +82,8 @@ export class ToolpathView {
   #highlight: VertexIndex | null = null;
   #nozzleMm: Vec3 | null = null;
   #follows = false;
+  /** The camera stands where it was put to see all: then it goes on doing so. */
+  #isFitted = false;
   #grown: Ms = 0;
   #growthMs: Ms = GROWTH_FRAME_MS;
   #rangesTimer: ReturnType<typeof setTimeout> | null = null;
@@ -295,6 +297,7 @@ export class ToolpathView {
     const fitted = fit({ ...camera, ...direction }, box, this.#drawing.stage.size);
     // The empty bed is not drawn again when a file is about to come.
     if (content || !isSameCamera(fitted, camera)) this.#move(fitted);
+    this.#isFitted = true;
   }
 
   /** Looks at the whole part from there. */
@@ -303,12 +306,15 @@ export class ToolpathView {
   }
 
   setProjection(projection: Projection): void {
+    const isFitted = this.#isFitted;
     this.#move({ ...this.#model.camera, projection });
+    this.#isFitted = isFitted;
   }
 
   resize({ width, height, ratio }: ViewSizePx): void {
     this.#drawing.smooth.reset();
     this.#drawing.stage.resize(width, height, ratio);
+    if (this.#isFitted) this.fit();
     this.#loop.moved();
   }
 
@@ -338,6 +344,7 @@ export class ToolpathView {
   };
 
   #move(camera: CameraState): void {
+    this.#isFitted = false;
     this.#model.camera = camera;
     this.#loop.moved();
   }

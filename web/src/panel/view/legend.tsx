@@ -1,4 +1,5 @@
 // What the 3D view is coloured by, and what the colours mean: shares of the features, or a scale with its limits.
+import { signal } from '@preact/signals';
 import {
   CATEGORICAL_MODES,
   COLOUR_MODES,
@@ -41,6 +42,10 @@ const Swatch = ({ colour }: { readonly colour: HexColour | null }): JSX.Element 
 const percent = (share: number): string =>
   share > 0 && share < 0.01 ? '< 1 %' : `${formatNumber(share * 100)} %`;
 
+/** In m; little is not nothing. */
+const metres = (filament: number): string =>
+  filament > 0 && filament < 10 ? '< 0.01 m' : `${formatNumber(filament / 1000, 2)} m`;
+
 function Features(): JSX.Element {
   const plan = outline.value;
   const features = plan?.features.filter(({ time, filament }) => time > 0 || filament > 0) ?? [];
@@ -80,7 +85,7 @@ function Features(): JSX.Element {
                 </th>
                 <td>{time > 0 ? formatDuration(time) : '–'}</td>
                 <td class="share">{all > 0 ? percent(time / all) : '–'}</td>
-                <td class="filament">{formatNumber(filament / 1000, 2)} m</td>
+                <td class="filament">{metres(filament)}</td>
               </tr>
             );
           })}
@@ -193,7 +198,7 @@ function Tools(): JSX.Element {
         <li key={tool}>
           <Swatch colour={categoryColour('tool', tool)} />
           <span class="grow">T{tool}</span>
-          <span class="dim">{formatNumber(filament / 1000, 2)} m</span>
+          <span class="dim">{metres(filament)}</span>
         </li>
       ))}
     </ul>
@@ -241,13 +246,30 @@ function Meaning({ mode }: { readonly mode: ColourMode }): JSX.Element | null {
   return <Scale mode={mode} />;
 }
 
+/** Where there is little room, the part goes before its legend. */
+const ROOMY = '(min-width: 961px)';
+/** The same beside the file's text. */
+const ROOMY_WITH_TEXT = '(min-width: 1500px)';
+const isOpen = signal(matchMedia(settings.peek().showText ? ROOMY_WITH_TEXT : ROOMY).matches);
+
+/** The text comes beside the view, and takes of its room. */
+export function makeRoom(): void {
+  if (!matchMedia(ROOMY_WITH_TEXT).matches) isOpen.value = false;
+}
+
 export function Legend({ isFlat }: { readonly isFlat: boolean }): JSX.Element | null {
   const plan = outline.value;
   if (!plan) return null;
   const modes = isFlat ? CATEGORICAL_MODES : COLOUR_MODES;
   const mode = modes.includes(settings.value.colourBy) ? settings.value.colourBy : 'feature';
   return (
-    <details class="legend" open={matchMedia('(min-width: 961px)').matches}>
+    <details
+      class="legend"
+      open={isOpen.value}
+      onToggle={(event) => {
+        isOpen.value = event.currentTarget.open;
+      }}
+    >
       <summary>Colours</summary>
       <div class="legend-body">
         <label class="field">

@@ -9,6 +9,7 @@ import { change, settings } from '../../state/settings';
 import { pictureOf } from '../../state/view_answers';
 import { save } from '../parts';
 import { view } from './canvas';
+import { makeRoom } from './legend';
 
 const PRESETS: readonly { readonly preset: CameraPreset; readonly name: string; readonly label: string }[] = [
   { preset: 'iso', name: 'All', label: 'Show all of it, from in front and above' },
@@ -134,7 +135,10 @@ export function ViewTools({ isFlat }: { readonly isFlat: boolean }): JSX.Element
             name="G-code"
             label="Show the G-code"
             isOn={showText}
-            onSet={(isOn) => change({ showText: isOn })}
+            onSet={(isOn) => {
+              change({ showText: isOn });
+              if (isOn) makeRoom();
+            }}
           />
         )}
       </fieldset>
