@@ -15,6 +15,8 @@ async function drawn(panel: Panel): Promise<void> {
 }
 
 async function take(page: Page, panel: Panel, name: string): Promise<void> {
+  // Buttons that were clicked have scrolled a narrow page.
+  await page.evaluate(() => window.scrollTo(0, 0));
   await drawn(panel);
   await page.screenshot({ path: picture(name) });
 }
