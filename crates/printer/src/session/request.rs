@@ -114,6 +114,7 @@ impl Session {
         }
         let since_power_up = ready.board.since_power_up;
         ready.diary.begin(&job.options, &ready.config, &ready.planner, since_power_up, now);
+        ready.diary.off(ready.off_mm);
         if job.skip.is_none() {
             ready.note_preheating();
         }
