@@ -1,6 +1,7 @@
 //! Prints on machines of every kinematics: what their pulses draw, and that a print survives on each of them.
 
 use std::{
+    fmt::Write as _,
     fs,
     path::{Path, PathBuf},
     process::Command,
@@ -203,6 +204,46 @@ fn what_cannot_be_reached_is_refused_with_its_line() {
             "{report:#}"
         );
         assert!(error.to_string().contains(words), "{error:#}");
+    }
+}
+
+/// Arcs and lines that come to the very middle of two positions of a motor, turn there and go back: whether that is a step there and
+/// back or none is for the last bits to say.
+#[test]
+fn ways_that_touch_half_a_step_are_counted_right() {
+    let mut print = String::from("G28\nG90\nG1 Z5 F6000\nG1 F9000\n");
+    for half in 0..40 {
+        // Steps are 0.0125 mm: the middles are 0.00625 mm beside them.
+        let top = 160.006_25 + 0.0125 * f64::from(half);
+        for (radius, way) in [(5.0, "G3"), (7.0, "G2"), (3.1, "G3")] {
+            let (x, y) = (top - radius, 120.0 + radius);
+            let (from, to) = if way == "G3" { (120.0 - radius, y) } else { (y, 120.0 - radius) };
+            let middle = 120.0 - from;
+            let _ = writeln!(print, "G1 X{x:.5} Y{from:.5}\n{way} X{x:.5} Y{to:.5} I0 J{middle:.5}");
+        }
+        // To the very same places and back.
+        let _ = writeln!(print, "G1 X{:.5} Y{:.5}\nG1 X150", top + 3.0, 110.0 - 0.0125 * f64::from(half));
+    }
+    print += "M84\n";
+    let report = simulate("touches", "cartesian", &print, &[]);
+    assert_eq!(report["result"], "done", "{report:#}");
+}
+
+#[test]
+fn a_plan_names_motors_as_the_machine_file_does_and_tells_of_lines_that_it_leaves_out() {
+    for (kinematics, names, others) in [
+        ("delta", ["stepper_a", "stepper_b", "stepper_c"], ["stepper_x", "stepper_y", "stepper_z"]),
+        ("corexy", ["stepper_x", "stepper_y", "stepper_z"], ["stepper_a", "stepper_b", "stepper_c"]),
+    ] {
+        let (text, _) = machine(kinematics);
+        let print = "G28\nG1 X5 Y3 Z2 F3000\nFROBNICATE\nG1 X1e400\nG1 X9\n";
+        let file = scratch(&format!("kinematics-named-{kinematics}.gcode"), print);
+        let config = scratch(&format!("kinematics-named-{kinematics}.cfg"), &text);
+        let plan = stepcast(&["plan", "--json"], &[&file, Path::new("--config"), &config]);
+        let steps = |name: &str| plan["motors"][name]["steps"].as_u64();
+        assert!(names.iter().all(|name| steps(name).is_some_and(|steps| steps > 0)), "{plan:#}");
+        assert!(others.iter().all(|name| steps(name).is_none()), "{plan:#}");
+        assert_eq!((&plan["skipped_lines"], &plan["first_skipped_line"]), (&2.into(), &3.into()), "{plan:#}");
     }
 }
 

@@ -249,7 +249,17 @@ pub enum MovedBy {
 
 /// What distinguishes a machine from others, as far as a plan depends on it.
 pub fn machine_check(config: &PrinterConfig) -> u32 {
-    CRC.checksum(format!("{config:?}").as_bytes())
+    struct Check(crc::Digest<'static, u32>);
+    impl core::fmt::Write for Check {
+        fn write_str(&mut self, text: &str) -> core::fmt::Result {
+            self.0.update(text.as_bytes());
+            Ok(())
+        }
+    }
+    let mut check = Check(CRC.digest());
+    // Nothing that is written there can fail.
+    let _ = write!(check, "{config:?}");
+    check.0.finalize()
 }
 
 /// Writes records.

@@ -103,7 +103,7 @@ impl Diary {
             machine: machine_check(config),
             clock: planner.clock().0,
             position: planner.position(),
-            transform: planner.transform().record(),
+            transform: options.transform.clone().unwrap_or_else(|| planner.transform().record()),
             homed: planner.guard.homed(),
             confirmed: options.confirmed_lines.clone(),
             confirm_all: options.confirm_all,
