@@ -63,6 +63,8 @@ pub struct Bound {
 impl Bound {
     /// For a machine with these motors, as in [`crate::LookAhead::with_motors`].
     pub fn new(motors: Vec<Option<MotorAbility>>) -> Self {
+        // Where nothing is known of any motor, none starts with a jump.
+        let motors = if motors.iter().any(Option::is_some) { motors } else { Vec::new() };
         Self { motors, ..Self::default() }
     }
 
@@ -347,6 +349,11 @@ mod tests {
             let mut at = [0.0; 4];
             let mut heading = 0.0;
             let point = |(turn, length, rise, filament, feed): (f64, f64, f64, f64, f64)| {
+                // Now and then the filament alone.
+                if rise < -0.45 {
+                    at[3] += 10.0 * (0.05 - filament);
+                    return (at, feed);
+                }
                 // Mostly slight turns, as on a curve.
                 heading += if turn < 5.0 { 0.1 * (turn - 2.5) } else { turn };
                 let z = if rise > 0.45 { rise } else { 0.0 };
@@ -369,6 +376,7 @@ mod tests {
             x_accel in 500.0..20_000.0_f64,
             y_velocity in 20.0..500.0_f64,
             deviation in proptest::option::of(0.0..0.1_f64),
+            motors in proptest::sample::select(vec![0_usize, 4]),
         ) {
             let limits = Limits {
                 max_xy_accel: [MmPerS2(x_accel), MmPerS2(f64::INFINITY)],
@@ -376,7 +384,7 @@ mod tests {
                 junction_deviation: deviation.map(Mm),
                 ..limits()
             };
-            let ratio = ratio(&points, limits, &[]);
+            let ratio = ratio(&points, limits, &[None, None, None, None][..motors]);
             // The sine of nearly straight corners loses half its digits.
             prop_assert!((ratio - 1.0).abs() < 1e-6, "{}", ratio);
         }
