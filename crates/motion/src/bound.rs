@@ -307,7 +307,7 @@ fn cell_time(length: f64, [start, end]: [f64; 2], cruise: f64, [up, down]: [f64;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ExtruderLimits, LookAhead, Torque};
+    use crate::{ExtruderLimits, LookAhead, PlannedMove, Torque};
     use proptest::prelude::*;
     use units::{Mm, MmPerS, MmPerS2};
 
@@ -326,19 +326,29 @@ mod tests {
         }
     }
 
-    /// Time of the plan over the least time.
+    /// Time of the plan over the least time. The plan's moves lead to where they say, one as fast as the next.
     fn ratio(points: &[([f64; 4], f64)], limits: Limits, motors: &[Option<MotorAbility>]) -> f64 {
         let mut look_ahead = LookAhead::with_motors(limits, motors.to_vec()).unwrap();
         let mut bound = Bound::new(motors.to_vec());
         let mut from = [0.0; 4];
+        let mut velocity = None;
+        let mut look_at = |planned: PlannedMove| {
+            assert!(velocity.is_none_or(|before| before == planned.start_velocity));
+            velocity = Some(planned.end_velocity);
+            for phase in planned.phases() {
+                let gap = phase.end_distance - phase.distance_at(phase.duration);
+                assert!(gap.abs() < 1e-9 * planned.length.max(1.0), "{gap} in {planned:?}");
+            }
+        };
         for &(to, feed) in points {
             let request = MoveRequest { from, to, feed: MmPerS(feed), tag: 0 };
             look_ahead.push(&request).unwrap();
-            while look_ahead.pop().is_some() {}
+            core::iter::from_fn(|| look_ahead.pop()).for_each(&mut look_at);
             bound.push(&request, &limits);
             from = to;
         }
         look_ahead.flush();
+        core::iter::from_fn(|| look_ahead.pop()).for_each(&mut look_at);
         bound.stop();
         look_ahead.print_time().0 / bound.total().0
     }
