@@ -8,6 +8,8 @@
 mod act;
 #[cfg(test)]
 mod arc_tests;
+#[cfg(test)]
+mod bound_tests;
 mod dynamics;
 #[cfg(test)]
 mod estimate_tests;
