@@ -446,7 +446,7 @@ fn the_slowest_shapers_take_what_a_fast_machine_is_given() {
         let at = |line: u32| [f64::from(line) * step * 0.1, f64::from(line) * step, 0.0, 0.0];
         for line in 0..lines {
             let (from, to) = (at(line), at(line + 1));
-            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+            let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
             let direction = core::array::from_fn(|axis| (to[axis] - from[axis]) / length);
             let start_time = lead + f64::from(line) * time;
             let speed = length / time;

@@ -127,6 +127,6 @@ impl fmt::Debug for SavedMesh {
             .field("axes", axes)
             .field("heights", &heights)
             .field("settings", settings)
-            .finish()
+            .finish_non_exhaustive()
     }
 }
