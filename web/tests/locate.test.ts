@@ -19,6 +19,7 @@ const AT: Interruption = {
   zError: mm(0),
   speedFactor: share(1),
   flowFactor: share(1),
+  transform: { mesh: null, skew: [0, 0, 0] },
 };
 const REFUSED: Trouble = { ...fileUnreadable('no'), code: 'continuation-refused' };
 

@@ -50,6 +50,7 @@ const AT: Interruption = {
   zError: mm(0.01),
   speedFactor: share(1.5),
   flowFactor: share(1),
+  transform: { mesh: null, skew: [0, 0, 0] },
 };
 
 test.each([

@@ -68,6 +68,7 @@ const fromInterruption = (view: InterruptionView): Interruption => ({
   zError: mm(view.z_error_mm),
   speedFactor: share(view.speed_factor),
   flowFactor: share(view.flow_factor),
+  transform: view.transform,
 });
 
 const fromJournal = (view: JournalView): JournalSummary => ({
@@ -235,13 +236,14 @@ class WasmSession implements Session {
     return refusal(() => this.#inner.request(JSON.stringify(toRequest(wish)), now));
   }
 
-  startJob({ confirmedLines, line }: PrintStart, journal: number | null, now: Seconds): Trouble | null {
+  startJob({ confirmedLines, line, transform }: PrintStart, journal: number | null, now: Seconds): Trouble | null {
     const isAll = confirmedLines === 'all';
     const request: JobRequest = {
       confirmed_lines: isAll ? [] : [...confirmedLines],
       confirm_all: isAll,
       journal,
       start_line: line,
+      ...(transform && { transform: { mesh: transform.mesh, skew: [...transform.skew] } }),
     };
     return refusal(() => this.#inner.start_job(JSON.stringify(request), now));
   }

@@ -177,15 +177,25 @@ export type HeldPrint =
 /** Lines that the user wants left out; all that are not known, where there are more than can be listed. */
 export type ConfirmedLines = readonly number[] | 'all';
 
+/** What makes up for skew and bed. */
+export interface Transform {
+  /** The name of the bed's mesh; null without one. */
+  readonly mesh: string | null;
+  /** How far Y leans in X, Z in X and Z in Y, in mm/mm. */
+  readonly skew: readonly [number, number, number];
+}
+
 /** How a print is begun. */
 export interface PrintStart {
   readonly confirmedLines: ConfirmedLines;
   /** The line with which it begins, as if those before had been made; null is the first. Then it is paused. */
   readonly line: number | null;
+  /** What is in force when its file begins; null leaves it as it is. */
+  readonly transform: Transform | null;
 }
 
 /** From the first line, with nothing left out. */
-export const WHOLE: PrintStart = { confirmedLines: [], line: null };
+export const WHOLE: PrintStart = { confirmedLines: [], line: null, transform: null };
 
 /** Where an interrupted print was, as far as its journal and its file tell. */
 export interface Interruption {
@@ -210,6 +220,8 @@ export interface Interruption {
   readonly zError: Mm;
   readonly speedFactor: Share;
   readonly flowFactor: Share;
+  /** What had been in force when its file began. */
+  readonly transform: Transform;
 }
 
 /** What there is of a kept print's file. */

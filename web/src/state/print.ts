@@ -62,7 +62,7 @@ export async function printShown(
   const before = printed.value;
   printed.value = { file: open, summary: found, marks: lineMarks(), from };
   const facts = { name: open.name, time: found.time, lines: found.lines };
-  const start = { confirmedLines: consent.value, line: from?.line ?? null };
+  const start = { confirmedLines: consent.value, line: from?.line ?? null, transform: at?.transform ?? null };
   const isBegun = await print(open.blob, facts, start, lost?.id ?? null);
   if (!isBegun) printed.value = before;
   else if (from) begin(from, at);
