@@ -236,7 +236,11 @@ class WasmSession implements Session {
     return refusal(() => this.#inner.request(JSON.stringify(toRequest(wish)), now));
   }
 
-  startJob({ confirmedLines, line, transform }: PrintStart, journal: number | null, now: Seconds): Trouble | null {
+  startJob(
+    { confirmedLines, line, transform }: PrintStart,
+    journal: number | null,
+    now: Seconds,
+  ): Trouble | null {
     const isAll = confirmedLines === 'all';
     const request: JobRequest = {
       confirmed_lines: isAll ? [] : [...confirmedLines],
