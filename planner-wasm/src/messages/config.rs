@@ -2,7 +2,7 @@
 
 use printer::{
     config::{ConfigDiagnostic, Kinematics, PrinterConfig, Severity},
-    transform::Mesh,
+    transform::SavedMesh,
 };
 use serde::Serialize;
 
@@ -157,7 +157,7 @@ impl MachineSummary {
             nozzle_mm: extruder.map(|extruder| extruder.nozzle_diameter.0),
             filament_mm: extruder.map(|extruder| extruder.filament_diameter.0),
             heaters: nozzle.into_iter().chain(bed).collect(),
-            meshes: config.profiles.meshes.values().map(|mesh| MeshSummary::of(mesh)).collect(),
+            meshes: config.profiles.meshes.values().map(MeshSummary::of).collect(),
             has_fan: config.fan.is_some(),
             baud: config.mcu.baud,
         }
@@ -165,13 +165,13 @@ impl MachineSummary {
 }
 
 impl MeshSummary {
-    fn of(mesh: &Mesh) -> Self {
-        let surface = mesh.surface();
+    fn of(mesh: &SavedMesh) -> Self {
+        let axes = mesh.axes();
         Self {
-            name: mesh.name.clone(),
-            min_mm: surface.axes.map(|axis| axis.min),
-            step_mm: surface.axes.map(|axis| axis.pitch()),
-            heights_mm: surface.rows().map(<[f64]>::to_vec).collect(),
+            name: mesh.name().to_owned(),
+            min_mm: axes.map(|axis| axis.min),
+            step_mm: axes.map(|axis| axis.pitch()),
+            heights_mm: mesh.rows().map(<[f64]>::to_vec).collect(),
         }
     }
 }

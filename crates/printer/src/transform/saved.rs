@@ -79,6 +79,16 @@ impl SavedMesh {
         &self.name
     }
 
+    /// Where its points lie.
+    pub const fn axes(&self) -> [GridAxis; 2] {
+        self.axes
+    }
+
+    /// The height of each point as it was measured, in rows of Y.
+    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.heights.chunks(self.axes[0].count)
+    }
+
     /// The mesh, worked out once.
     pub fn mesh(&self) -> Result<Arc<Mesh>, MeshError> {
         self.made.get_or_init(|| self.make().map(Arc::new)).clone()
