@@ -63,6 +63,8 @@ pub struct Bound {
 impl Bound {
     /// For a machine with these motors, as in [`crate::LookAhead::with_motors`].
     pub fn new(motors: Vec<Option<MotorAbility>>) -> Self {
+        // Where nothing is known of any motor, none starts with a jump.
+        let motors = if motors.iter().any(Option::is_some) { motors } else { Vec::new() };
         Self { motors, ..Self::default() }
     }
 
@@ -77,15 +79,15 @@ impl Bound {
         let Some(mut way) = self.way(from, request, bend, limits) else { return };
         self.at = Some(request.to);
         way.corner_v2 = self.ways.last().map_or(way.rest_v2, |before| self.corner(before, &way));
-        if !self.ways.is_empty() && (way.corner_v2 == 0.0 || self.ways.len() >= MOVES_MAX) {
-            self.solve();
+        if way.corner_v2 == 0.0 || self.ways.len() >= MOVES_MAX {
+            self.solve(0.0);
         }
         self.ways.push(way);
     }
 
     /// Everything pushed so far ends at rest.
     pub fn stop(&mut self) {
-        self.solve();
+        self.solve(self.ways.last().map_or(0.0, |last| last.rest_v2));
         self.at = None;
     }
 
@@ -248,9 +250,9 @@ impl Bound {
         if self.motors.is_empty() { start } else { self.accel(way, v2 + cell * start, demand) }
     }
 
-    /// Adds the least time from the first move, which starts with what its corner allows, to rest at the end of the last.
-    fn solve(&mut self) {
-        let Some(last) = self.ways.last() else { return };
+    /// Adds the least time from the first move, which starts with what its corner allows, to a squared speed at the end of
+    /// the last.
+    fn solve(&mut self, end_v2: f64) {
         let cells: Vec<u32> = self
             .ways
             .iter()
@@ -259,7 +261,7 @@ impl Bound {
         let points: usize = cells.iter().map(|&count| count as usize).sum();
         // Backward: from where the speed at each point can still be taken down to what comes.
         let mut speeds = vec![0.0; points + 1];
-        let mut next: f64 = last.rest_v2;
+        let mut next: f64 = end_v2;
         speeds[points] = next;
         let mut point = points;
         for (way, &count) in self.ways.iter().zip(&cells).rev() {
@@ -305,7 +307,7 @@ fn cell_time(length: f64, [start, end]: [f64; 2], cruise: f64, [up, down]: [f64;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ExtruderLimits, LookAhead, Torque};
+    use crate::{ExtruderLimits, LookAhead, PlannedMove, Torque};
     use proptest::prelude::*;
     use units::{Mm, MmPerS, MmPerS2};
 
@@ -324,19 +326,26 @@ mod tests {
         }
     }
 
-    /// Time of the plan over the least time.
+    /// Time of the plan over the least time. The plan's moves lead to where they say, one as fast as the next.
     fn ratio(points: &[([f64; 4], f64)], limits: Limits, motors: &[Option<MotorAbility>]) -> f64 {
         let mut look_ahead = LookAhead::with_motors(limits, motors.to_vec()).unwrap();
         let mut bound = Bound::new(motors.to_vec());
         let mut from = [0.0; 4];
+        let mut velocity = None;
+        let mut look_at = |planned: PlannedMove| {
+            assert!(velocity.is_none_or(|before| before == planned.start_velocity));
+            velocity = Some(planned.end_velocity);
+            assert!(planned.gap_mm() < 1e-9 * planned.length.max(1.0), "{planned:?}");
+        };
         for &(to, feed) in points {
             let request = MoveRequest { from, to, feed: MmPerS(feed), tag: 0 };
             look_ahead.push(&request).unwrap();
-            while look_ahead.pop().is_some() {}
+            core::iter::from_fn(|| look_ahead.pop()).for_each(&mut look_at);
             bound.push(&request, &limits);
             from = to;
         }
         look_ahead.flush();
+        core::iter::from_fn(|| look_ahead.pop()).for_each(&mut look_at);
         bound.stop();
         look_ahead.print_time().0 / bound.total().0
     }
@@ -347,6 +356,11 @@ mod tests {
             let mut at = [0.0; 4];
             let mut heading = 0.0;
             let point = |(turn, length, rise, filament, feed): (f64, f64, f64, f64, f64)| {
+                // Now and then the filament alone.
+                if rise < -0.45 {
+                    at[3] += 10.0 * (0.05 - filament);
+                    return (at, feed);
+                }
                 // Mostly slight turns, as on a curve.
                 heading += if turn < 5.0 { 0.1 * (turn - 2.5) } else { turn };
                 let z = if rise > 0.45 { rise } else { 0.0 };
@@ -369,6 +383,7 @@ mod tests {
             x_accel in 500.0..20_000.0_f64,
             y_velocity in 20.0..500.0_f64,
             deviation in proptest::option::of(0.0..0.1_f64),
+            motors in proptest::sample::select(vec![0_usize, 4]),
         ) {
             let limits = Limits {
                 max_xy_accel: [MmPerS2(x_accel), MmPerS2(f64::INFINITY)],
@@ -376,7 +391,7 @@ mod tests {
                 junction_deviation: deviation.map(Mm),
                 ..limits()
             };
-            let ratio = ratio(&points, limits, &[]);
+            let ratio = ratio(&points, limits, &[None, None, None, None][..motors]);
             // The sine of nearly straight corners loses half its digits.
             prop_assert!((ratio - 1.0).abs() < 1e-6, "{}", ratio);
         }

@@ -230,7 +230,10 @@ impl LookAhead {
 
     /// The next move whose speeds are final, in order.
     pub fn pop(&mut self) -> Option<PlannedMove> {
-        self.ready.pop_front()
+        let planned = self.ready.pop_front()?;
+        // A plan that does not lead to where it says would have the steps that are left over made all at once.
+        debug_assert!(planned.gap_mm() < 1e-6 * planned.length.max(1.0), "{planned:?}");
+        Some(planned)
     }
 
     /// Moves that have been pushed and not been taken.

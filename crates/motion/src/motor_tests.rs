@@ -104,6 +104,23 @@ fn a_long_move_goes_to_the_top_that_the_torque_leaves_and_no_further() {
 }
 
 #[test]
+fn a_way_that_turns_back_ends_each_move_where_it_should() {
+    // The moves up to a batch are released before the way turns, with a last one that just about can slow down.
+    for last in 1..=300 {
+        let out = (1..16).map(|step| 5.0 * f64::from(step)).chain([75.0 + 0.001 * f64::from(last)]);
+        let points: Vec<_> = out.chain([0.0]).map(|x| ([x, 0.0, 0.0, 0.0], 100.0)).collect();
+        let planned = plan(&torque(), &points, limits());
+        for planned in &planned {
+            check_torque(&torque(), planned);
+            assert!(planned.gap_mm() < 1e-9, "with {last}: {planned:?}");
+        }
+        for pair in planned.windows(2) {
+            assert_eq!(pair[0].end_velocity, pair[1].start_velocity);
+        }
+    }
+}
+
+#[test]
 fn a_diagonal_asks_each_motor_for_its_share() {
     let torque = torque();
     let straight = plan(&torque, &[([3000.0, 0.0, 0.0, 0.0], 5000.0)], limits());

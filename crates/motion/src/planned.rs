@@ -139,6 +139,12 @@ impl PlannedMove {
         ]
     }
 
+    /// The largest gap between where a phase leads to and where it says that it ends, in mm: rounding.
+    pub(crate) fn gap_mm(&self) -> f64 {
+        let gap = |phase: Phase| (phase.distance_at(phase.duration) - phase.end_distance).abs();
+        self.phases().map(gap).fold(0.0, f64::max)
+    }
+
     /// Path driven `time` seconds after the start of the move, in mm; its ends outside the move.
     pub fn distance_at(&self, time: f64) -> f64 {
         if time <= 0.0 {

@@ -5,7 +5,7 @@
 //! up to slowing down, its peak is the ceiling of the real speed from where it began to speed up to where it ends slowing
 //! down.
 //!
-//! The pass runs backward from rest at the end of the window. A junction's speed is *final* where it is not this end that
+//! The pass runs backward from the end of the window. A junction's speed is *final* where it is not this end that
 //! limits it: later moves can then no longer change it. Every release depends on the moves alone, never on when
 //! somebody looks, so the same moves always give the same plan; a forced release happens after a fixed number of moves.
 
@@ -76,20 +76,20 @@ impl Window {
 
     /// Releases every move that nothing can change any more.
     pub(crate) fn release_final(&mut self, print_time: &mut f64, out: &mut VecDeque<PlannedMove>) {
-        self.plan();
+        self.plan(false);
         let count = self.nodes.iter().rposition(|node| node.is_final).map_or(0, |last| last + 1);
         self.release(count, print_time, out);
     }
 
-    /// Releases the oldest `count` moves as they are planned now, as if the window ended at rest. What remains goes on
-    /// from there.
+    /// Releases the oldest `count` moves as they are planned now, as if the window ended at rest; it does where they are all.
+    /// What remains goes on from there.
     pub(crate) fn release_oldest(
         &mut self,
         count: usize,
         print_time: &mut f64,
         out: &mut VecDeque<PlannedMove>,
     ) {
-        self.plan();
+        self.plan(count >= self.len());
         self.release(count.min(self.len()), print_time, out);
         let (Some(first), Some(end_v2)) = (self.entries.front_mut(), self.released_end_v2) else { return };
         // The junction is now fixed: to both profiles it is a limit like that of a corner.
@@ -102,10 +102,11 @@ impl Window {
         }
     }
 
-    /// The backward pass, from rest at the end.
-    fn plan(&mut self) {
+    /// The backward pass, from the end. A machine that stops there may do so with a jump; a move that may still come can ask
+    /// for less.
+    fn plan(&mut self, stops: bool) {
         self.nodes.clear();
-        let end = self.entries.back().map_or(0.0, |last| last.jump_v2);
+        let end = self.entries.back().filter(|_| stops).map_or(0.0, |last| last.jump_v2);
         let mut next = After { v2: end, smoothed_v2: end, is_final: false, smoothed_is_final: false };
         // The peak of the virtual profile behind the move in hand, and whether it (or its absence) is final.
         let mut ceiling: Option<f64> = None;

@@ -7,6 +7,8 @@
 
 #[cfg(test)]
 mod arc_tests;
+#[cfg(test)]
+mod bound_tests;
 mod dynamics;
 #[cfg(test)]
 mod estimate_tests;
