@@ -111,6 +111,7 @@ fn declarations(config: &Config) -> Vec<File> {
         one::<m::PreviewSummary>(config),
         one::<m::JournalView>(config),
         one::<m::InterruptionView>(config),
+        one::<m::TransformView>(config),
         one::<m::VirtualState>(config),
         one::<m::MotorState>(config),
         one::<m::HeaterState>(config),

@@ -234,7 +234,7 @@ impl Host {
         Some((self.session.motion_clock(now)?, freq)).filter(|_| freq > 0.0)
     }
 
-    /// Where the head is now, going evenly through the present move.
+    /// Where the head is now, in the G-code's coordinates, going evenly through the present move.
     fn live(&mut self, now: Seconds) -> Option<[f64; 4]> {
         let (clock_now, _) = self.clock(now)?;
         while self.ahead.pop_front_if(|mv| mv.end <= clock_now).is_some() {}
@@ -243,7 +243,8 @@ impl Host {
         };
         let part = ticks_between(mv.start, clock_now) / ticks_between(mv.start, mv.end);
         let part = part.clamp(0.0, 1.0);
-        Some([0, 1, 2, 3].map(|axis| mv.from[axis] + part * (mv.to[axis] - mv.from[axis])))
+        let at = [0, 1, 2, 3].map(|axis| mv.from[axis] + part * (mv.to[axis] - mv.from[axis]));
+        Some(self.session.gcode_from_machine(at))
     }
 
     /// The toolhead's planned speed around now, pairs of time (s, relative to now) and speed (mm/s); nothing while the

@@ -11,7 +11,7 @@ use std::{
 
 use anyhow::Context;
 use printer::{
-    machine::MOTOR_NAMES,
+    machine::{self, MOTORS},
     planner::{LayerTotal, PlanOptions, PlanReport, PlanStream, Ramps, Total},
 };
 use serde::Serialize;
@@ -37,6 +37,10 @@ struct Report {
     bytes_per_step: f64,
     max_step_error_us: f64,
     filament_mm: f64,
+    /// Lines that were left out, and the first of them.
+    skipped_lines: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    first_skipped_line: Option<u32>,
     features: Vec<Feature>,
     #[serde(skip_serializing_if = "Option::is_none")]
     layers: Option<Vec<Layer>>,
@@ -65,9 +69,10 @@ struct Motor {
     peak_steps_per_s: f64,
 }
 
-impl From<&PlanReport> for Report {
-    fn from(plan: &PlanReport) -> Self {
-        let motors = MOTOR_NAMES.iter().zip(&plan.motors).map(|(&name, motor)| {
+impl Report {
+    /// Of a plan for a machine whose motors have these names.
+    fn of(plan: &PlanReport, names: [&'static str; MOTORS]) -> Self {
+        let motors = names.into_iter().zip(&plan.motors).map(|(name, motor)| {
             let &printer::planner::MotorReport { steps, queue_steps, peak_steps_per_s } = motor;
             (name, Motor { steps, queue_steps, peak_steps_per_s })
         });
@@ -81,6 +86,8 @@ impl From<&PlanReport> for Report {
             bytes_per_step: if steps == 0 { 0.0 } else { plan.bytes as f64 / steps as f64 },
             max_step_error_us: plan.step_error_max.0 * 1e6,
             filament_mm: plan.filament_mm,
+            skipped_lines: plan.skipped_lines,
+            first_skipped_line: plan.first_skipped.map(|line| line.0),
             features: plan.features.iter().map(|&(name, total)| Feature::new(name, total)).collect(),
             layers: None,
         }
@@ -138,12 +145,13 @@ pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
         dump.finish()?;
     }
     drop(progress);
-    let mut report = Report::from(&plan);
+    let names = machine::motor_names(&config);
+    let mut report = Report::of(&plan, names);
     report.layers = args.layers.then(|| plan.layers.iter().map(Layer::from).collect());
     if args.json {
         console::print_json(&report)?;
     } else {
-        console::print(&text(&report));
+        console::print(&text(&report, names));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -173,7 +181,7 @@ fn flush(dump: &mut Option<Dump<'_>>, blocks: &mut Vec<u8>) -> anyhow::Result<()
     Ok(())
 }
 
-fn text(report: &Report) -> String {
+fn text(report: &Report, names: [&'static str; MOTORS]) -> String {
     let mut text = String::new();
     let time = console::duration_text(report.print_time_s);
     let _ = writeln!(text, "Print time   {time} ({:.2} s)", report.print_time_s);
@@ -192,7 +200,7 @@ fn text(report: &Report) -> String {
         let _ = writeln!(text, "  {name:<18} {time:>14} {filament_mm:>12.1} mm");
     }
     let _ = writeln!(text, "Motor              steps  queue_steps    peak steps/s");
-    for name in MOTOR_NAMES {
+    for name in names {
         if let Some(motor) = report.motors.get(name) {
             let Motor { steps, queue_steps, peak_steps_per_s } = motor;
             let _ = writeln!(text, "  {name:<10} {steps:>11} {queue_steps:>12} {peak_steps_per_s:>15.0}");
@@ -200,13 +208,21 @@ fn text(report: &Report) -> String {
     }
     let _ = writeln!(text, "Stream       {} bytes, {:.3} bytes a step", report.bytes, report.bytes_per_step);
     let _ = writeln!(text, "Step times   at most {:.2} µs off", report.max_step_error_us);
+    if let Some(line) = report.first_skipped_line {
+        let _ = writeln!(
+            text,
+            "Left out     {} lines, the first is line {line}: `stepcast check` says why",
+            report.skipped_lines
+        );
+    }
     text
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use printer::planner::MotorReport;
+    use gcode::LineNumber;
+    use printer::{machine::MOTOR_NAMES, planner::MotorReport};
     use units::Seconds;
 
     #[test]
@@ -214,7 +230,7 @@ mod tests {
         let mut plan = PlanReport { print_time: Seconds(12.5), bytes: 300, ..PlanReport::default() };
         plan.motors[1] = MotorReport { steps: 1000, queue_steps: 10, peak_steps_per_s: 2e4 };
         plan.step_error_max = Seconds(25e-6);
-        let report = Report::from(&plan);
+        let report = Report::of(&plan, MOTOR_NAMES);
         let json = serde_json::to_value(&report).unwrap();
         let keys: Vec<_> = json.as_object().unwrap().keys().map(String::as_str).collect();
         let mut wanted = [
@@ -225,6 +241,7 @@ mod tests {
             "bytes_per_step",
             "max_step_error_us",
             "filament_mm",
+            "skipped_lines",
             "features",
         ];
         wanted.sort_unstable();
@@ -232,11 +249,22 @@ mod tests {
         assert_eq!(json["motors"]["stepper_y"]["queue_steps"], 10);
         assert_eq!(json["bytes_per_step"], 0.3);
         assert!((json["max_step_error_us"].as_f64().unwrap() - 25.0).abs() < 1e-9);
-        assert!(text(&report).contains("stepper_y         1000"), "{}", text(&report));
+        let shown = text(&report, MOTOR_NAMES);
+        assert!(shown.contains("stepper_y         1000") && !shown.contains("Left out"), "{shown}");
     }
 
     #[test]
     fn a_plan_without_steps_divides_by_nothing() {
-        assert_eq!(Report::from(&PlanReport::default()).bytes_per_step, 0.0);
+        assert_eq!(Report::of(&PlanReport::default(), MOTOR_NAMES).bytes_per_step, 0.0);
+    }
+
+    #[test]
+    fn lines_that_are_left_out_are_told() {
+        let plan =
+            PlanReport { skipped_lines: 2, first_skipped: Some(LineNumber(7)), ..PlanReport::default() };
+        let report = Report::of(&plan, MOTOR_NAMES);
+        let shown = text(&report, MOTOR_NAMES);
+        assert!(shown.contains("Left out     2 lines, the first is line 7"), "{shown}");
+        assert_eq!(serde_json::to_value(&report).unwrap()["first_skipped_line"], 7);
     }
 }

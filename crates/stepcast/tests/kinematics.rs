@@ -1,6 +1,7 @@
 //! Prints on machines of every kinematics: what their pulses draw, and that a print survives on each of them.
 
 use std::{
+    fmt::Write as _,
     fs,
     path::{Path, PathBuf},
     process::Command,
@@ -99,16 +100,37 @@ fn every_machine_draws_what_the_file_says() {
     }
 }
 
+/// A shaper makes an axis late, not the head stray: to and fro along one axis, whatever another has, the head stays on its
+/// line. Were it on the motors, those that move the head together would come apart while it speeds up.
 #[test]
 fn filters_are_on_the_axes_not_on_the_motors() {
-    for kinematics in ["corexy", "delta"] {
-        let (text, print) = machine(kinematics);
-        let text = format!("{text}\n[input_shaper]\nshaper_freq_x: 55\nshaper_freq_y: 40\n");
-        let file = scratch(&format!("kinematics-shaped-{kinematics}.gcode"), &print);
-        let config = scratch(&format!("kinematics-shaped-{kinematics}.cfg"), &text);
-        let report = stepcast(&["simulate", "--json"], &[&file, Path::new("--config"), &config]);
-        assert_eq!(report["result"], "done", "{kinematics}: {report:#}");
-        assert!(all_motors(&report, |motor| motor["lost_steps"] == 0), "{kinematics}: {report:#}");
+    // Each axis by itself, with the other's shaper as unlike as can be; rests between moves, for shapers round corners.
+    let moves = |x: f64, y: f64, z: f64| {
+        let to_and_fro = |axis: &str, middle: f64, far: f64| {
+            let end = |by: f64| format!("G1 {axis}{:.3}\nM400\nG4 P200\n", middle + by);
+            [far, -far, 0.3 * far, -far, 0.0].map(end).concat()
+        };
+        let xy = to_and_fro("X", x, 60.0) + &to_and_fro("Y", y, 55.0);
+        format!("G28\nG90\nG1 Z{z} F6000\nM400\nG4 P200\nG1 F12000\n{xy}M84\n")
+    };
+    for (kinematics, print) in [
+        ("corexy", moves(150.0, 140.0, 30.0)),
+        ("hybrid_corexy", moves(150.0, 140.0, 30.0)),
+        ("corexz", moves(150.0, 140.0, 30.0)),
+        ("hybrid_corexz", moves(150.0, 140.0, 30.0)),
+        ("delta", moves(0.0, 0.0, 30.0)),
+    ] {
+        for shapers in
+            ["shaper_freq_x: 20\n", "shaper_freq_y: 20\n", "shaper_freq_x: 30\nshaper_freq_y: 55\n"]
+        {
+            let text = format!("{}\n[input_shaper]\n{shapers}", machine(kinematics).0);
+            let file = scratch(&format!("kinematics-shaped-{kinematics}.gcode"), &print);
+            let config = scratch(&format!("kinematics-shaped-{kinematics}.cfg"), &text);
+            let report = stepcast(&["simulate", "--json"], &[&file, Path::new("--config"), &config]);
+            assert_eq!(report["result"], "done", "{kinematics}: {report:#}");
+            assert!(all_motors(&report, |motor| motor["lost_steps"] == 0), "{kinematics}: {report:#}");
+            assert!(seconds(&report, "path_error_max_mm") <= 0.025, "{kinematics}, {shapers}: {report:#}");
+        }
     }
 }
 
@@ -182,6 +204,46 @@ fn what_cannot_be_reached_is_refused_with_its_line() {
             "{report:#}"
         );
         assert!(error.to_string().contains(words), "{error:#}");
+    }
+}
+
+/// Arcs and lines that come to the very middle of two positions of a motor, turn there and go back: whether that is a step there and
+/// back or none is for the last bits to say.
+#[test]
+fn ways_that_touch_half_a_step_are_counted_right() {
+    let mut print = String::from("G28\nG90\nG1 Z5 F6000\nG1 F9000\n");
+    for half in 0..40 {
+        // Steps are 0.0125 mm: the middles are 0.00625 mm beside them.
+        let top = 160.006_25 + 0.0125 * f64::from(half);
+        for (radius, way) in [(5.0, "G3"), (7.0, "G2"), (3.1, "G3")] {
+            let (x, y) = (top - radius, 120.0 + radius);
+            let (from, to) = if way == "G3" { (120.0 - radius, y) } else { (y, 120.0 - radius) };
+            let middle = 120.0 - from;
+            let _ = writeln!(print, "G1 X{x:.5} Y{from:.5}\n{way} X{x:.5} Y{to:.5} I0 J{middle:.5}");
+        }
+        // To the very same places and back.
+        let _ = writeln!(print, "G1 X{:.5} Y{:.5}\nG1 X150", top + 3.0, 110.0 - 0.0125 * f64::from(half));
+    }
+    print += "M84\n";
+    let report = simulate("touches", "cartesian", &print, &[]);
+    assert_eq!(report["result"], "done", "{report:#}");
+}
+
+#[test]
+fn a_plan_names_motors_as_the_machine_file_does_and_tells_of_lines_that_it_leaves_out() {
+    for (kinematics, names, others) in [
+        ("delta", ["stepper_a", "stepper_b", "stepper_c"], ["stepper_x", "stepper_y", "stepper_z"]),
+        ("corexy", ["stepper_x", "stepper_y", "stepper_z"], ["stepper_a", "stepper_b", "stepper_c"]),
+    ] {
+        let (text, _) = machine(kinematics);
+        let print = "G28\nG1 X5 Y3 Z2 F3000\nFROBNICATE\nG1 X1e400\nG1 X9\n";
+        let file = scratch(&format!("kinematics-named-{kinematics}.gcode"), print);
+        let config = scratch(&format!("kinematics-named-{kinematics}.cfg"), &text);
+        let plan = stepcast(&["plan", "--json"], &[&file, Path::new("--config"), &config]);
+        let steps = |name: &str| plan["motors"][name]["steps"].as_u64();
+        assert!(names.iter().all(|name| steps(name).is_some_and(|steps| steps > 0)), "{plan:#}");
+        assert!(others.iter().all(|name| steps(name).is_none()), "{plan:#}");
+        assert_eq!((&plan["skipped_lines"], &plan["first_skipped_line"]), (&2.into(), &3.into()), "{plan:#}");
     }
 }
 

@@ -107,11 +107,15 @@ impl DelayedSum {
     pub(crate) fn rest_at(&mut self, time: f64, position: f64) {
         self.close_short();
         let (end_time, _) = self.end();
-        // A segment that the first copy has left stays as it is.
-        let is_open = self.taps.first().is_some_and(|tap| tap.index < self.segments.len());
         match self.segments.back_mut() {
-            Some(last) if is_open && last.is_rest() && last.start == position => {
+            Some(last) if last.is_rest() && last.start == position => {
                 last.duration = larger(last.duration, time - last.start_time);
+                // Copies that had left it are in it again: however short the moves are in which an axis stands still, they
+                // are one segment.
+                let at = self.segments.len() - 1;
+                for tap in &mut self.taps {
+                    tap.index = tap.index.min(at);
+                }
             }
             _ if time > end_time => {
                 self.segments.push_back(Segment::rest(end_time, time - end_time, position));

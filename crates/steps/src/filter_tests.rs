@@ -421,6 +421,75 @@ fn a_file_of_dust_stays_within_its_bounds() {
     assert!(std::iter::from_fn(|| generator.pop()).count() > 0);
 }
 
+/// The slowest shapers that there are, and lines of a step each: while X is not known, Y's way piles up.
+#[test]
+fn the_slowest_shapers_take_what_a_fast_machine_is_given() {
+    for (kind, damping) in [(ShaperKind::ThreeHumpEi, 0.0), (ShaperKind::TwoHumpEi, 0.1)] {
+        let filters = Filters { shapers: [Shaper::new(kind, 5.0, damping), None, None], smooth_time: None };
+        let mut generator = generator(Cartesian, &filters, &Advance::NONE);
+        let speed = 700.0;
+        let step = STEP_DISTANCES[1];
+        let time = step / speed;
+        let lead = generator.lead().0;
+        assert!(lead > 0.1, "{lead}");
+        generator.begin_run([0.0; 4]).unwrap();
+        let lines = (0.5 / time) as u32;
+        let mut steps = [0_u64; AXES];
+        let mut take = |generator: &mut StepGenerator| {
+            for command in std::iter::from_fn(|| generator.pop()) {
+                if let crate::StepCommandKind::QueueStep { count, .. } = command.kind {
+                    steps[command.motor] += u64::from(count);
+                }
+            }
+        };
+        // Evenly, however it came to that speed: X goes along slowly.
+        let at = |line: u32| [f64::from(line) * step * 0.1, f64::from(line) * step, 0.0, 0.0];
+        for line in 0..lines {
+            let (from, to) = (at(line), at(line + 1));
+            let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
+            let direction = core::array::from_fn(|axis| (to[axis] - from[axis]) / length);
+            let start_time = lead + f64::from(line) * time;
+            let speed = length / time;
+            let one = PlannedMove {
+                tag: line,
+                from,
+                to,
+                direction,
+                length,
+                start_time,
+                accel_time: 0.0,
+                cruise_time: time,
+                decel_time: 0.0,
+                start_velocity: speed,
+                cruise_velocity: speed,
+                end_velocity: speed,
+                accel: 1000.0,
+                shape: None,
+                bend: None,
+            };
+            generator.push(&one).unwrap_or_else(|error| panic!("{error} in line {line} of {lines}"));
+            take(&mut generator);
+        }
+        generator.end_run().unwrap();
+        take(&mut generator);
+        assert_eq!(steps[1], u64::from(lines));
+    }
+}
+
+/// An axis that stands still takes one segment for that, however short the moves are meanwhile.
+#[test]
+fn standing_still_through_dust_takes_no_memory() {
+    let mut filter = Filter::shaper(&Shaper::new(ShaperKind::ThreeHumpEi, 5.0, 0.1).unwrap());
+    filter.begin(1.5);
+    let mut out = Vec::new();
+    for move_of_1_us in 1..100_000_u32 {
+        filter.path().rest_at(1.0 + 1e-6 * f64::from(move_of_1_us), 1.5);
+        filter.drain(&mut out);
+        assert!(filter.held() <= 2, "{}", filter.held());
+    }
+    assert!(out.is_empty());
+}
+
 #[test]
 fn a_move_before_its_filters_is_refused() {
     let mut generator = generator(Cartesian, &all_filters(), &Advance::NONE);

@@ -14,8 +14,11 @@ use motion::{PlannedMove, RUN_TIME_MAX};
 use std::collections::VecDeque;
 use units::{Hertz, Seconds, StepCount, Ticks};
 
-/// The most stretches of one motor's path that wait to be turned into steps.
+/// With so many stretches of one motor's path that wait to be turned into steps, what can be taken has to be taken, and rows
+/// are closed early.
 pub const PIECES_MAX: usize = 4096;
+/// The most that may wait for another motor's path, which the slowest shaper makes known 0.2 s late: 80 000 of them a second.
+pub const PIECES_HELD_MAX: usize = 16_384;
 /// The axis that pressure advance is for.
 const EXTRUDER: usize = 3;
 /// Positions are below this many steps: beyond it a float's half steps blur.
@@ -90,6 +93,8 @@ pub struct StepGenerator<K = Cartesian> {
     position: [f64; AXES],
     end_time: f64,
     ended: bool,
+    /// Since the last move, everything possible has been taken.
+    is_drained: bool,
     /// What the move in hand adds to the axes and to a motor.
     paths: [Vec<Segment>; AXES],
     segments: Vec<Segment>,
@@ -138,6 +143,7 @@ impl<K: Kinematics> StepGenerator<K> {
             position: [0.0; AXES],
             end_time: 0.0,
             ended: false,
+            is_drained: false,
             paths: Default::default(),
             segments: Vec::new(),
             staged: Vec::new(),
@@ -219,7 +225,8 @@ impl<K: Kinematics> StepGenerator<K> {
         if self.ended {
             return Err(PushError::Ended);
         }
-        if self.is_full() {
+        let most = if self.is_drained { PIECES_HELD_MAX } else { PIECES_MAX };
+        if self.has_pieces(most) {
             return Err(PushError::Full);
         }
         let end_time = planned.end_time();
@@ -240,6 +247,7 @@ impl<K: Kinematics> StepGenerator<K> {
             return Err(error);
         }
         self.accept();
+        self.is_drained = false;
         self.position = planned.to;
         self.end_time = self.end_time.max(end_time);
         for (index, motor) in self.motors.iter_mut().enumerate() {
@@ -248,8 +256,8 @@ impl<K: Kinematics> StepGenerator<K> {
         Ok(())
     }
 
-    fn is_full(&self) -> bool {
-        self.motors.iter().any(|motor| motor.pieces.len() >= PIECES_MAX)
+    fn has_pieces(&self, count: usize) -> bool {
+        self.motors.iter().any(|motor| motor.pieces.len() >= count)
     }
 
     /// Whether every motor starts where it is and ends in its range.
@@ -386,6 +394,12 @@ impl<K: Kinematics> StepGenerator<K> {
     /// The next command, in the order of the (true) time of its first step over all motors; `None` until more is pushed
     /// or the run is ended.
     pub fn pop(&mut self) -> Option<StepCommand> {
+        let command = self.next_command();
+        self.is_drained = command.is_none();
+        command
+    }
+
+    fn next_command(&mut self) -> Option<StepCommand> {
         loop {
             // The motor whose next step is first, and when another may be.
             let (mut index, mut earliest, mut others) = (0, f64::INFINITY, f64::INFINITY);
@@ -409,7 +423,7 @@ impl<K: Kinematics> StepGenerator<K> {
                 }
             };
             if is_stuck {
-                if !self.is_full() {
+                if !self.has_pieces(PIECES_MAX) {
                     return None;
                 }
                 // Its open command holds up a motor whose pieces have no room left.

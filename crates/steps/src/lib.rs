@@ -32,7 +32,7 @@ mod windows;
 pub use advance::{Advance, Nonlinear};
 pub use compressor::{RUN_SPAN_MAX, STEP_HOLD_MAX, STEPS_BUFFERED_MAX};
 pub use delayed_sum::SEGMENTS_HELD_MAX;
-pub use generator::{Filters, PIECES_MAX, SMOOTH_TIME_MAX, StepGenerator};
+pub use generator::{Filters, PIECES_HELD_MAX, PIECES_MAX, SMOOTH_TIME_MAX, StepGenerator};
 pub use kinematics::{AXES, Cartesian, Delta, Geometry, Kinematics, Linear, STRETCH_RATIO_MAX, Tower};
 pub use segment::{DEGREE_MAX, Segment};
 pub use shaper::{DAMPING_RATIOS, SHAPER_FREQUENCIES, Shaper, ShaperKind};

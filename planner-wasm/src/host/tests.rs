@@ -81,6 +81,36 @@ fn a_snapshot_follows_the_machine() {
     assert!(host.planned_speed(now, Seconds(6.0), Seconds(20.0)).is_empty());
 }
 
+/// The head is told of in the G-code's coordinates on its way over a bed that is not flat, as it is where it rests.
+#[test]
+fn where_the_head_is_has_one_meaning() {
+    const BED: &str = "\n[bed_mesh]\n[bed_mesh hill]\npoints:\n  0.1, 0.2, 0.3\n  0.2, 0.5, 0.4\n  0.3, 0.4, 0.5\n\
+        x_count: 3\ny_count: 3\nmin_x: 0\nmax_x: 300\nmin_y: 0\nmax_y: 300\n";
+    let machine = || parse(&format!("{}{BED}", demo_machine::USUAL_MACHINE)).0.unwrap();
+    let mut printer = Simulation::new(machine(), None, 1, "").unwrap();
+    let mut host = Host::new(machine(), printer.now());
+    let ready = |event: &UiEvent| *event == UiEvent::Phase { phase: PhaseLabel::Ready };
+    assert!(run(&mut host, &mut printer, 20.0, ready));
+    let text = "G28\nBED_MESH_PROFILE LOAD=hill\nG90\nG1 X20 Y20 Z2 F6000".to_owned();
+    host.request(UiRequest::Gcode { text }, printer.now()).unwrap();
+    assert!(run(&mut host, &mut printer, 120.0, |event| matches!(event, UiEvent::Homed { axis: 2, .. })));
+    let settled = printer.now().0 + 5.0;
+    run(&mut host, &mut printer, settled, |_| false);
+    host.request(UiRequest::Gcode { text: "G1 X220 Y180 F1200".to_owned() }, printer.now()).unwrap();
+    let (mut is_on_the_way, mut highest) = (0, 0.0_f64);
+    for _ in 0..16 {
+        let later = printer.now().0 + 1.0;
+        run(&mut host, &mut printer, later, |_| false);
+        let snapshot = host.snapshot(printer.now());
+        let [x, _, z, _] = snapshot.live_mm.unwrap();
+        assert!((z - 2.0).abs() < 0.005, "Z {z} at X {x}");
+        is_on_the_way += u32::from(x > 25.0 && x < 215.0);
+        // The motor stands elsewhere.
+        highest = highest.max(printer.state().motors[2].position_mm);
+    }
+    assert!(is_on_the_way > 5 && highest > 2.3, "{is_on_the_way} {highest}");
+}
+
 #[test]
 fn what_nobody_takes_is_bounded_and_counted() {
     let mut host = Host::new(machine(), Seconds(0.0));

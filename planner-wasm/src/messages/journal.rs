@@ -1,7 +1,11 @@
 //! What a print's journal says, for those who ask whether to go on with it.
 
-use printer::{interruption::Interruption, journal::Journal};
-use serde::Serialize;
+use printer::{
+    interruption::Interruption,
+    journal::Journal,
+    transform::{Skew, TransformRecord},
+};
+use serde::{Deserialize, Serialize};
 
 /// A journal, as far as it could be read.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -70,6 +74,33 @@ pub struct InterruptionView {
     pub speed_factor: f64,
     /// See `speed_factor`.
     pub flow_factor: f64,
+    /// What made up for skew and bed before the file's first line, loaded by hand: for `JobRequest.transform`.
+    pub transform: TransformView,
+}
+
+/// What makes up for skew and bed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "bindings", derive(ts_rs::TS))]
+#[serde(deny_unknown_fields)]
+pub struct TransformView {
+    /// The name of the bed's mesh (`[bed_mesh NAME]`); `null` without one.
+    pub mesh: Option<String>,
+    /// How far Y leans in X, Z in X and Z in Y, in mm/mm.
+    pub skew: [f64; 3],
+}
+
+impl From<TransformView> for TransformRecord {
+    fn from(view: TransformView) -> Self {
+        let [xy, xz, yz] = view.skew;
+        Self { skew: Skew { xy, xz, yz }, mesh: view.mesh }
+    }
+}
+
+impl From<TransformRecord> for TransformView {
+    fn from(record: TransformRecord) -> Self {
+        let Skew { xy, xz, yz } = record.skew;
+        Self { mesh: record.mesh, skew: [xy, xz, yz] }
+    }
 }
 
 impl From<&Interruption> for InterruptionView {
@@ -90,6 +121,7 @@ impl From<&Interruption> for InterruptionView {
             z_error_mm: found.standings.error.0,
             speed_factor,
             flow_factor,
+            transform: found.transform.clone().into(),
         }
     }
 }

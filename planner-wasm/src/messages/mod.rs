@@ -17,7 +17,7 @@ mod virtual_state;
 pub use config::{ConfigFinding, ConfigReport, ConfigSeverity, HeaterSummary, MachineSummary};
 pub use error::ErrorMessage;
 pub use event::{HeaterName, PhaseLabel, UiEvent};
-pub use journal::{InterruptionView, JournalView};
+pub use journal::{InterruptionView, JournalView, TransformView};
 pub use preview::{
     Blocking, FeatureSummary, FileKindReport, Finding, FindingSeverity, LayerSummary, PreviewSummary,
 };

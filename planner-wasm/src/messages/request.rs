@@ -9,7 +9,7 @@ use printer::{
 use serde::Deserialize;
 use units::{Celsius, Mm, MmPerS};
 
-use super::HeaterName;
+use super::{HeaterName, TransformView};
 
 /// An axis that can be jogged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -155,13 +155,18 @@ pub struct JobRequest {
     /// The line with which the job begins, paused; `null`: with its file.
     #[serde(default)]
     pub start_line: Option<u32>,
+    /// What makes up for skew and bed when the file begins (`InterruptionView.transform`, where a print goes on that was
+    /// interrupted); left out: what is in force.
+    #[serde(default)]
+    #[cfg_attr(feature = "bindings", ts(optional))]
+    pub transform: Option<TransformView>,
 }
 
 impl From<JobRequest> for JobOptions {
     fn from(request: JobRequest) -> Self {
         let confirmed_lines: BTreeSet<u32> = request.confirmed_lines.into_iter().collect();
-        let JobRequest { confirm_all, journal, start_line, .. } = request;
-        Self { confirmed_lines, confirm_all, journal, start_line }
+        let JobRequest { confirm_all, journal, start_line, transform, .. } = request;
+        Self { confirmed_lines, confirm_all, journal, start_line, transform: transform.map(Into::into) }
     }
 }
 

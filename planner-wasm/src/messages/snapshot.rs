@@ -20,11 +20,12 @@ pub struct Snapshot {
     pub board: Option<BoardView>,
     /// Each heater that has been read.
     pub temperatures: Vec<TemperatureView>,
-    /// Where the last planned move ends: X, Y, Z and filament. `null` while it is not known.
+    /// Where the last planned move ends, in the G-code's coordinates: X, Y, Z and filament. `null` while it is not known.
     pub position_mm: Option<[f64; 4]>,
-    /// Where the head is now, on the way there. `null` while it is not known.
+    /// Where the head is now, on the way there, in the same coordinates. `null` while it is not known.
     pub live_mm: Option<[f64; 4]>,
-    /// How much higher Z's motor stands than `position_mm` has it: what makes up for a bed that is not flat.
+    /// How much higher Z's motor stands than `position_mm` has it, once it is there: what makes up for a bed that is not
+    /// flat.
     pub z_lift_mm: f64,
     /// Which of X, Y, Z are homed; the position of the others means nothing.
     pub homed: [bool; 3],

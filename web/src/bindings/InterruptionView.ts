@@ -1,4 +1,5 @@
 // Generated from planner-wasm/src/messages by `cargo xtask bindings`. Do not edit.
+import type { TransformView } from './TransformView';
 import type { Mm, Seconds } from './units';
 
 /**
@@ -61,4 +62,8 @@ speed_factor: number,
 /**
  * See `speed_factor`.
  */
-flow_factor: number, };
+flow_factor: number, 
+/**
+ * What made up for skew and bed before the file's first line, loaded by hand: for `JobRequest.transform`.
+ */
+transform: TransformView, };

@@ -1,4 +1,5 @@
 // Generated from planner-wasm/src/messages by `cargo xtask bindings`. Do not edit.
+import type { TransformView } from './TransformView';
 
 /**
  * What a job is started with.
@@ -19,4 +20,9 @@ journal: number | null,
 /**
  * The line with which the job begins, paused; `null`: with its file.
  */
-start_line: number | null, };
+start_line: number | null, 
+/**
+ * What makes up for skew and bed when the file begins (`InterruptionView.transform`, where a print goes on that was
+ * interrupted); left out: what is in force.
+ */
+transform?: TransformView, };

@@ -28,15 +28,16 @@ board: BoardView | null,
  */
 temperatures: Array<TemperatureView>, 
 /**
- * Where the last planned move ends: X, Y, Z and filament. `null` while it is not known.
+ * Where the last planned move ends, in the G-code's coordinates: X, Y, Z and filament. `null` while it is not known.
  */
 position_mm: [Mm, Mm, Mm, Mm] | null, 
 /**
- * Where the head is now, on the way there. `null` while it is not known.
+ * Where the head is now, on the way there, in the same coordinates. `null` while it is not known.
  */
 live_mm: [Mm, Mm, Mm, Mm] | null, 
 /**
- * How much higher Z's motor stands than `position_mm` has it: what makes up for a bed that is not flat.
+ * How much higher Z's motor stands than `position_mm` has it, once it is there: what makes up for a bed that is not
+ * flat.
  */
 z_lift_mm: Mm, 
 /**

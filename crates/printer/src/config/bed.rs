@@ -9,7 +9,7 @@ use super::Builder;
 use super::diagnostics::excerpt;
 use super::reader::{Checked, Range, Reader, Reported};
 use crate::transform::{
-    Fade, GridAxis, Interpolation, LAGRANGE_POINTS_MAX, Mesh, Profiles, SKEW_MAX, Skew, Surface,
+    Fade, GridAxis, Interpolation, LAGRANGE_POINTS_MAX, MeshSettings, Profiles, SKEW_MAX, SavedMesh, Skew,
     Z_ERROR_MAX_MM,
 };
 
@@ -46,7 +46,7 @@ pub(super) fn profiles(builder: &mut Builder<'_>) -> Checked<Arc<Profiles>> {
         reader.finish();
         // What cannot be read has been refused; what cannot be used is not there when it is to be loaded.
         if let Ok(mesh) = found {
-            meshes.insert(mesh.name.clone(), Arc::new(mesh));
+            meshes.insert(mesh.name().to_owned(), mesh);
         }
     }
     settings?;
@@ -91,23 +91,17 @@ fn name_of(section: &str) -> String {
     section.split_once(' ').map_or("", |(_, name)| name).to_owned()
 }
 
-/// What `[bed_mesh]` says of all profiles.
-struct Settings {
-    fade: Fade,
-    target: Option<f64>,
-    z_error: f64,
-    reference: Option<[f64; 2]>,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self { fade: Fade { start: 1.0, end: 0.0 }, target: None, z_error: Z_ERROR_MAX_MM, reference: None }
-    }
-}
+/// Where there is no `[bed_mesh]`.
+const NO_SETTINGS: MeshSettings = MeshSettings {
+    fade: Fade { start: 1.0, end: 0.0 },
+    target: None,
+    z_error: Z_ERROR_MAX_MM,
+    reference: None,
+};
 
 /// `[bed_mesh]`. Where the bed would be probed is checked, and of no use.
-fn bed_mesh(builder: &mut Builder<'_>) -> Checked<Settings> {
-    let Some(mut reader) = builder.section("bed_mesh") else { return Ok(Settings::default()) };
+fn bed_mesh(builder: &mut Builder<'_>) -> Checked<MeshSettings> {
+    let Some(mut reader) = builder.section("bed_mesh") else { return Ok(NO_SETTINGS) };
     for key in ["mesh_min", "mesh_max", "mesh_origin"] {
         place(&mut reader, key)?;
     }
@@ -137,7 +131,7 @@ fn bed_mesh(builder: &mut Builder<'_>) -> Checked<Settings> {
     let z_error = reader.number_or("split_delta_z", 0.025, Range::from(Z_ERROR_MIN_MM));
     let reference = place(&mut reader, "zero_reference_position");
     reader.finish();
-    Ok(Settings {
+    Ok(MeshSettings {
         fade: Fade { start: start?, end: end? },
         target: target?,
         z_error: z_error?,
@@ -149,7 +143,7 @@ fn bed_mesh(builder: &mut Builder<'_>) -> Checked<Settings> {
 const Z_ERROR_MIN_MM: f64 = 0.0005;
 
 /// A saved mesh.
-fn profile(reader: &mut Reader<'_>, settings: Option<&Settings>) -> Checked<Mesh> {
+fn profile(reader: &mut Reader<'_>, settings: Option<&MeshSettings>) -> Checked<SavedMesh> {
     let name = name_of(reader.name());
     let version = reader.integer_or("version", 1, 1, 1);
     let place = Range::from(-PLACE_MAX_MM).to(PLACE_MAX_MM);
@@ -193,23 +187,12 @@ fn profile(reader: &mut Reader<'_>, settings: Option<&Settings>) -> Checked<Mesh
         }
     }
     let heights = heights(reader, &rows?, counts)?;
-    let surface = Surface::new(axes, heights).ok_or_else(|| reader.error("points", "they make no grid"))?;
-    let Some(Settings { fade, target, z_error, reference }) = settings else { return Err(Reported) };
-    let surface = match reference {
-        Some([x, y]) if is_on(&surface, [*x, *y]) => {
-            let height = surface.height(*x, *y);
-            surface.lowered(height)
-        }
-        _ => surface,
-    };
-    Mesh::new(name, surface, Some(*fade), *target, *z_error).map_err(|error| {
+    let settings = settings.ok_or(Reported)?;
+    let saved = SavedMesh::new(name, axes, heights, *settings);
+    saved.ok_or_else(|| reader.error("points", "they make no grid"))?.map_err(|error| {
         reader.warning("points", format!("the profile is left out and cannot be loaded: {error}"));
         Reported
     })
-}
-
-fn is_on(surface: &Surface, place: [f64; 2]) -> bool {
-    surface.axes.iter().zip(place).all(|(axis, at)| (axis.min..=axis.max).contains(&at))
 }
 
 /// Rows of Y, each of X.

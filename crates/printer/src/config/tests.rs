@@ -435,7 +435,7 @@ fn meshes_and_skews_are_read_as_they_were_saved() {
     assert!(diagnostics.iter().all(|it| it.severity == Severity::Info), "{diagnostics:#?}");
     let profiles = config.unwrap().profiles;
     assert_eq!(profiles.skews["calm"], crate::transform::Skew { xy: 0.004, xz: 0.0, yz: 0.0 });
-    let mesh = &profiles.meshes["default"];
+    let mesh = profiles.meshes["default"].mesh().unwrap();
     assert_eq!(mesh.z_error, crate::transform::Z_ERROR_MAX_MM);
     let at = |x, y| mesh.machine_from_gcode([x, y, 0.0])[2];
     // Less what it is where Z is to be 0.

@@ -20,7 +20,7 @@ use crate::{
     machine,
     planner::{Next, Source},
     preview::layers::Layers,
-    transform::Transform,
+    transform::{Transform, TransformRecord},
 };
 
 /// Things in the file that are read in one go.
@@ -59,6 +59,8 @@ pub struct Interruption {
     pub standings: Standings,
     /// The speed and flow factors that held.
     pub factors: [f64; 2],
+    /// What made up for skew and bed before the file's first line: what was loaded by hand.
+    pub transform: TransformRecord,
 }
 
 /// Finds that out.
@@ -292,6 +294,7 @@ impl Survey {
                 z_range,
             ),
             factors: known.factors,
+            transform: self.journal.transform().clone(),
         })
     }
 }

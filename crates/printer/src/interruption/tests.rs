@@ -110,6 +110,7 @@ fn a_move_in_pieces_may_have_been_made_in_part() {
     };
     let long = found(mesh(), None, &at(5));
     assert_eq!((long.line, long.start_line), (5, 5));
+    assert_eq!(long.transform, mesh());
     let [low, high] = long.z_range.unwrap();
     assert!(low <= Mm(0.9) && high >= Mm(1.3), "{low} {high}");
     // The last of the file: what is behind it says nothing of Z.

@@ -22,7 +22,12 @@ pub(crate) use self::{
     rows::{BoardQueue, MotorQueue, Row},
 };
 
-use crate::{config::PrinterConfig, machine::MOTORS, planner::Position, transform::TransformRecord};
+use crate::{
+    config::PrinterConfig,
+    machine::MOTORS,
+    planner::{Position, Source},
+    transform::TransformRecord,
+};
 
 /// The format that is written.
 pub const FORMAT: u32 = 2;
@@ -62,6 +67,17 @@ pub enum Input {
     Fan(f64),
     /// The user set a heater, in °C. Not part of the plan, but of what it is carried out with.
     Target(HeaterName, f64),
+}
+
+impl Input {
+    /// Gives a factor to what reads the file; everything else is none of its business.
+    fn apply_factor(self, source: &mut Source) {
+        match self {
+            Self::Speed(factor) => source.set_speed_factor(factor),
+            Self::Flow(factor) => source.interpreter.set_flow_factor(factor),
+            Self::FinishRun | Self::Fan(_) | Self::Target(..) => {}
+        }
+    }
 }
 
 /// How far a motor has come in the rows of a run of motion.
@@ -198,6 +214,9 @@ pub enum Record {
     },
     /// What is known of where the Z axis stands.
     Height(Height),
+    /// So far are axes from where the plan has them, in mm: what homing others could not put right in whole steps. Written
+    /// where it changes; nothing at first.
+    Off([f64; 3]),
     /// The print is over, one way or another.
     Ended,
 }
@@ -230,7 +249,17 @@ pub enum MovedBy {
 
 /// What distinguishes a machine from others, as far as a plan depends on it.
 pub fn machine_check(config: &PrinterConfig) -> u32 {
-    CRC.checksum(format!("{config:?}").as_bytes())
+    struct Check(crc::Digest<'static, u32>);
+    impl core::fmt::Write for Check {
+        fn write_str(&mut self, text: &str) -> core::fmt::Result {
+            self.0.update(text.as_bytes());
+            Ok(())
+        }
+    }
+    let mut check = Check(CRC.digest());
+    // Nothing that is written there can fail.
+    let _ = write!(check, "{config:?}");
+    check.0.finalize()
 }
 
 /// Writes records.
@@ -300,6 +329,8 @@ pub struct Journal {
     pub progress: Option<(u32, Seconds)>,
     /// What was last known of where the Z axis stands.
     pub height: Option<Height>,
+    /// See [`Record::Off`].
+    off_mm: [f64; 3],
     /// Whether the print is over.
     pub has_ended: bool,
     /// Bytes that could be read; what follows them was torn off or damaged.
@@ -370,6 +401,7 @@ impl Journal {
             last_id: print,
             progress: None,
             height: None,
+            off_mm: [0.0; 3],
             has_ended: false,
             bytes: 0,
         })
@@ -389,6 +421,7 @@ impl Journal {
             }
             Record::Progress { line, elapsed } => self.progress = Some((line, Seconds(elapsed))),
             Record::Height(height) => self.height = Some(height),
+            Record::Off(off_mm) => self.off_mm = off_mm,
             // A second begin belongs to another print, which has no place in this journal.
             Record::Began { .. } | Record::Ended => self.has_ended = true,
         }

@@ -91,6 +91,8 @@ pub(crate) struct Continuation {
     pub(crate) parked: Option<Parked>,
     /// What was last written of where Z stands.
     pub(crate) height: Option<Height>,
+    /// How far axes are from where the plan has them, in mm.
+    pub(crate) off_mm: [f64; 3],
 }
 
 /// How far a replay is.
@@ -130,6 +132,7 @@ pub(crate) struct Replay {
     last_id: u32,
     parked: Option<Parked>,
     height: Option<Height>,
+    off_mm: [f64; 3],
     /// Reads up to the line with which the print begins.
     skip: Option<Skip>,
     is_done: bool,
@@ -192,6 +195,7 @@ impl Replay {
             last_id: journal.last_id,
             parked,
             height: journal.height,
+            off_mm: journal.off_mm,
             skip: journal.start_line.map(|line| Skip::new(line, endstops)),
             is_done: false,
         })
@@ -267,7 +271,7 @@ impl Replay {
         let adopted: Vec<Input> =
             self.inputs.iter().map(|(_, input)| *input).filter(|input| *input != Input::FinishRun).collect();
         for &input in &adopted {
-            apply_factor(&mut source, input);
+            input.apply_factor(&mut source);
         }
         let from = core::array::from_fn(|motor| self.wanted.from[motor].after(&self.queue.motors[motor]));
         let forward = self.motors.each_ref().map(|motor| motor.forward);
@@ -294,6 +298,7 @@ impl Replay {
             id: self.last_id,
             parked: self.parked,
             height: self.height,
+            off_mm: self.off_mm,
         }
     }
 
@@ -310,7 +315,7 @@ impl Replay {
                 self.set_target(heater.heater(), Celsius(celsius));
             }
             Input::Fan(speed) => self.fan = speed,
-            Input::Speed(_) | Input::Flow(_) => apply_factor(&mut self.source, input),
+            Input::Speed(_) | Input::Flow(_) => input.apply_factor(&mut self.source),
         }
     }
 
@@ -486,13 +491,5 @@ impl Replay {
             made.rows >= first && made.counted >= self.queue.motors[motor].received
         };
         (0..MOTORS).all(has)
-    }
-}
-
-fn apply_factor(source: &mut Source, input: Input) {
-    match input {
-        Input::Speed(factor) => source.set_speed_factor(factor),
-        Input::Flow(factor) => source.interpreter.set_flow_factor(factor),
-        Input::FinishRun | Input::Fan(_) | Input::Target(..) => {}
     }
 }

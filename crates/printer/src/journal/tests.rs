@@ -50,9 +50,11 @@ fn what_was_written_is_read_to_the_last_bit() {
             retract: 0.1 + 0.2,
         }),
         Record::Progress { line: 77, elapsed: 1.5 },
+        Record::Off([0.1 + 0.2, 0.0, -1.0 / 3.0]),
     ];
     let text = written(&records);
     let journal = Journal::read(text.as_bytes()).unwrap();
+    assert_eq!(journal.off_mm, [0.1 + 0.2, 0.0, -1.0 / 3.0]);
     assert_eq!(
         journal.position.map(f64::to_bits),
         [0.1 + 0.2, 1.0 / 3.0, f64::MIN_POSITIVE, 4.0].map(f64::to_bits)

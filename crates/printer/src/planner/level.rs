@@ -19,7 +19,11 @@ const DUST_MM: f64 = 1e-9;
 impl Planner {
     /// Where the last accepted move ends, in the G-code's coordinates.
     pub fn gcode_position(&self) -> Position {
-        let [x, y, z, e] = self.position;
+        self.gcode_from_machine(self.position)
+    }
+
+    /// Where the G-code has what is there for the motors, by the skew and the bed that are in force.
+    pub fn gcode_from_machine(&self, [x, y, z, e]: Position) -> Position {
         let [x, y, z] = self.transform.gcode_from_machine([x, y, z]);
         [x, y, z, e]
     }

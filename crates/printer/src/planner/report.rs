@@ -1,5 +1,6 @@
 //! What a plan amounts to: times, steps and the bytes that would travel, without any board.
 
+use gcode::{Diagnostic, LineNumber, Severity};
 use motion::PlannedMove;
 use steps::{StepCommand, StepCommandKind};
 use units::{Hertz, MmPerS3, Seconds};
@@ -46,6 +47,10 @@ pub struct PlanReport {
     pub step_error_max: Seconds,
     /// Filament pushed less filament pulled back, in mm.
     pub filament_mm: f64,
+    /// Lines that were left out because they are wrong or not understood, and the first of them: [`crate::check`] lists them.
+    pub skipped_lines: u32,
+    /// See `skipped_lines`.
+    pub first_skipped: Option<LineNumber>,
     /// The least time that the same moves could take under the same limits, where it was asked for.
     pub bound: Option<Seconds>,
     /// What each kind of extrusion takes, and what is none: [`Estimates::features`]. All times together are the print time.
@@ -151,6 +156,8 @@ pub struct PlanStream {
     accounted: Seconds,
     /// Waits of the file outside of any run of motion.
     dwelt: Seconds,
+    /// The line that was left out last.
+    last_skipped: Option<LineNumber>,
 }
 
 impl PlanStream {
@@ -192,6 +199,7 @@ impl PlanStream {
             estimates: Estimates::new(machine::filament_area_mm2(config)),
             accounted: Seconds::ZERO,
             dwelt: Seconds::ZERO,
+            last_skipped: None,
         })
     }
 
@@ -287,8 +295,19 @@ impl PlanStream {
                 Planned::Timed { line, action: TimedAction::Annotation(annotation), .. } => {
                     self.estimates.annotate(line.0, &annotation);
                 }
-                Planned::Timed { .. } | Planned::Notice(_) => {}
+                Planned::Notice(notice) => self.note(&notice),
+                Planned::Timed { .. } => {}
             }
+        }
+    }
+
+    /// Counts a line that was left out, once.
+    fn note(&mut self, notice: &Diagnostic) {
+        let is_skipped = matches!(notice.severity, Severity::Blocking | Severity::Error);
+        if is_skipped && self.last_skipped != Some(notice.line) {
+            self.last_skipped = Some(notice.line);
+            self.report.first_skipped.get_or_insert(notice.line);
+            self.report.skipped_lines = self.report.skipped_lines.saturating_add(1);
         }
     }
 

@@ -1,6 +1,6 @@
 //! What comes out of a plan, and when.
 
-use gcode::Heater;
+use gcode::{Heater, Wait};
 use steps::StepCommandKind;
 use units::Celsius;
 

@@ -157,6 +157,7 @@ impl Holding {
             confirm_all: journal.confirm_all,
             journal: Some(journal.print),
             start_line: journal.start_line,
+            transform: Some(journal.transform().clone()),
         };
         self.replay = Some((replay, options));
         Ok(())

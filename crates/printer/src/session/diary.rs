@@ -55,6 +55,8 @@ struct Job {
     told_z: f64,
     /// What was last written of where Z stands.
     height: Option<Height>,
+    /// What was last written of how far axes are from where the plan has them.
+    off_mm: [f64; 3],
     /// The board counts since its drivers were powered up, as far as is known.
     since_power_up: bool,
     /// It is put aside, and can be taken up from there.
@@ -101,7 +103,7 @@ impl Diary {
             machine: machine_check(config),
             clock: planner.clock().0,
             position: planner.position(),
-            transform: planner.transform().record(),
+            transform: options.transform.clone().unwrap_or_else(|| planner.transform().record()),
             homed: planner.guard.homed(),
             confirmed: options.confirmed_lines.clone(),
             confirm_all: options.confirm_all,
@@ -117,6 +119,7 @@ impl Diary {
             made: None,
             told_z: f64::NAN,
             height: None,
+            off_mm: [0.0; 3],
             since_power_up,
             parked: None,
         });
@@ -141,6 +144,7 @@ impl Diary {
             made: None,
             told_z: f64::NAN,
             height,
+            off_mm: taken.off_mm,
             since_power_up,
             parked: taken.parked,
         });
@@ -303,6 +307,13 @@ impl Diary {
             job.height = Some(height);
             self.writer.write(&Record::Height(height));
         }
+    }
+
+    /// How far axes are from where the planner has them, in mm. Written where it is not what was written last.
+    pub(super) fn off(&mut self, off_mm: [f64; 3]) {
+        let Some(job) = self.job.as_mut().filter(|job| job.off_mm != off_mm) else { return };
+        job.off_mm = off_mm;
+        self.writer.write(&Record::Off(off_mm));
     }
 
     /// Whether Z is where something has moved it that is not in the journal.

@@ -9,6 +9,7 @@ use super::stream::Cut;
 use crate::{
     error::PrinterError,
     planner::{Planner, Position, Skip, Source},
+    transform::TransformRecord,
 };
 
 /// Going back to where a print was paused is done at this speed.
@@ -17,7 +18,7 @@ pub(super) const RETURN_FEED: MmPerS = MmPerS(50.0);
 pub(super) const PROGRESS_INTERVAL: Seconds = Seconds(0.25);
 
 /// What a job is started with.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct JobOptions {
     /// Lines with something blocking in them that the user has confirmed: they are passed over.
     pub confirmed_lines: BTreeSet<u32>,
@@ -29,6 +30,9 @@ pub struct JobOptions {
     /// The job begins with this line, as if those before it had been made: it is paused, until the machine is homed and
     /// the user resumes it.
     pub start_line: Option<u32>,
+    /// What makes up for skew and bed when the file begins; without it, what is in force. Where a print goes on that was
+    /// interrupted, that is [`crate::interruption::Interruption::transform`].
+    pub transform: Option<TransformRecord>,
 }
 
 /// A job that begins in the middle of its file, and waits for the user.

@@ -110,10 +110,16 @@ impl Session {
         let mut job = Job::new(options, machine::gcode_settings(&ready.config));
         match job.options.start_line {
             Some(line) if line > 1 => ready.begin_at(&mut job, line)?,
-            _ => ready.planner.begin_job(&mut job.source),
+            _ => {
+                if let Some(record) = &job.options.transform {
+                    ready.planner.set_recorded_transform(record)?;
+                }
+                ready.planner.begin_job(&mut job.source);
+            }
         }
         let since_power_up = ready.board.since_power_up;
         ready.diary.begin(&job.options, &ready.config, &ready.planner, since_power_up, now);
+        ready.diary.off(ready.off_mm);
         if job.skip.is_none() {
             ready.note_preheating();
         }
@@ -203,6 +209,15 @@ impl Session {
         match &self.stage {
             Stage::Ready(ready) => Some((ready.planner.gcode_position(), ready.planner.guard.homed())),
             _ => None,
+        }
+    }
+
+    /// Where the G-code has a place of the motors, such as those of [`super::ScheduledMove`], by the skew and the bed that
+    /// are in force for what is planned now.
+    pub fn gcode_from_machine(&self, position: Position) -> Position {
+        match &self.stage {
+            Stage::Ready(ready) => ready.planner.gcode_from_machine(position),
+            _ => position,
         }
     }
 

@@ -6,6 +6,7 @@
 
 mod mesh;
 mod pieces;
+mod saved;
 mod skew;
 mod surface;
 #[cfg(test)]
@@ -19,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 pub use mesh::{Fade, Mesh, MeshError, Z_ERROR_MAX_MM};
 pub use pieces::{PIECE_MIN_MM, Pieces};
+pub use saved::{MeshSettings, SavedMesh};
 pub use skew::{SKEW_MAX, Skew};
 pub use surface::{Cell, GridAxis, Interpolation, LAGRANGE_POINTS_MAX, Surface};
 
@@ -33,7 +35,7 @@ pub struct Profiles {
     /// `[skew_correction NAME]`.
     pub skews: BTreeMap<String, Skew>,
     /// `[bed_mesh NAME]`.
-    pub meshes: BTreeMap<String, Arc<Mesh>>,
+    pub meshes: BTreeMap<String, SavedMesh>,
 }
 
 /// What is in force.
@@ -62,6 +64,9 @@ impl TransformRecord {
 impl Transform {
     /// What a record tells of.
     pub fn recorded(record: &TransformRecord, profiles: &Profiles) -> Result<Self, String> {
+        if !record.skew.is_possible() {
+            return Err("the skew is none that an axis can have".to_owned());
+        }
         let mesh = record.mesh.as_deref().map(|name| known_mesh(name, profiles)).transpose()?;
         Ok(Self { skew: record.skew, mesh })
     }
@@ -213,8 +218,9 @@ impl Transform {
 }
 
 fn known_mesh(name: &str, profiles: &Profiles) -> Result<Arc<Mesh>, String> {
-    let mesh = profiles.meshes.get(name).cloned();
-    mesh.ok_or_else(|| format!("the machine file has no [bed_mesh {name}] that can be used"))
+    let saved = profiles.meshes.get(name);
+    let saved = saved.ok_or_else(|| format!("the machine file has no [bed_mesh {name}] that can be used"))?;
+    saved.mesh().map_err(|problem| format!("[bed_mesh {name}] cannot be used: {problem}"))
 }
 
 fn no_parallelogram([ac, bd, ad]: [f64; 3]) -> String {

@@ -35,6 +35,12 @@ impl Skew {
         (ad > 0.0 && side > 0.0 && factor.abs() <= SKEW_MAX).then_some(factor)
     }
 
+    /// Whether these are factors that axes can have.
+    pub fn is_possible(&self) -> bool {
+        // What is not a number is in no range.
+        [self.xy, self.xz, self.yz].iter().all(|factor| factor.abs() <= SKEW_MAX)
+    }
+
     /// Where the motors have to go for the head to get there.
     pub fn machine_from_gcode(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let y = y - self.yz * z;

@@ -192,17 +192,24 @@ pub struct Surface {
 impl Surface {
     /// Through these heights, given in rows of Y: as many as the axes have points, or there is none.
     pub fn new(axes: [GridAxis; 2], heights: Vec<f64>) -> Option<Self> {
+        Self::is_grid(&axes, &heights).then(|| Self::of_grid(axes, heights))
+    }
+
+    /// Whether there is one.
+    pub(super) fn is_grid(axes: &[GridAxis; 2], heights: &[f64]) -> bool {
         let fits = |axis: &GridAxis| {
             let lagrange = axis.interpolation == Interpolation::Lagrange;
             axis.count >= 2 && axis.max > axis.min && (!lagrange || axis.count <= LAGRANGE_POINTS_MAX)
         };
-        if !axes.iter().all(fits) || heights.len() != axes[0].count * axes[1].count {
-            return None;
-        }
+        axes.iter().all(fits) && heights.len() == axes[0].count * axes[1].count
+    }
+
+    /// Where there is one.
+    pub(super) fn of_grid(axes: [GridAxis; 2], heights: Vec<f64>) -> Self {
         let range = [f64::INFINITY, f64::NEG_INFINITY];
         let mut surface = Self { axes, heights, cells: Vec::new(), range, mean: 0.0 };
         surface.look();
-        Some(surface)
+        surface
     }
 
     /// Looks at each cell.

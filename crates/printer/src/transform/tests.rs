@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
+use gcode::{Action, MeshChange};
+
 use super::{
     Fade, GridAxis, Interpolation, Mesh, MeshError, PIECE_MIN_MM, Skew, Surface, Transform, Z_ERROR_MAX_MM,
 };
@@ -237,4 +239,45 @@ fn a_fade_shorter_than_the_bed_is_deep_is_refused() {
     assert!(mesh(20.0, Some(0.0)).is_ok());
     // An end below the start is no fade.
     assert_eq!(mesh(0.0, Some(5.0)).map(|mesh| mesh.fade()), Ok(None));
+}
+
+/// A machine file with a mesh of 3 by 3 points, of which one is this high.
+fn machine_with(options: &str, height: f64) -> crate::config::PrinterConfig {
+    let text = format!(
+        "{}\n[bed_mesh]\n{options}\n[bed_mesh cold]\npoints:\n  0.0, 0.1, 0.0\n  0.1, {height}, 0.1\n  0.0, 0.1, 0.2\n\
+         x_count: 3\ny_count: 3\nmin_x: 10\nmax_x: 90\nmin_y: 10\nmax_y: 90\n",
+        crate::config::SMALL_MACHINE
+    );
+    let (config, remarks) = crate::config::parse(&text);
+    config.unwrap_or_else(|| panic!("{remarks:#?}"))
+}
+
+#[test]
+fn a_saved_mesh_is_worked_out_when_it_is_loaded_and_no_sooner() {
+    let config = machine_with("", 0.3);
+    let saved = &config.profiles.meshes["cold"];
+    assert!(!saved.is_made());
+    // What tells machines apart does not change with that, and sees each of the heights.
+    let check = crate::journal::machine_check(&config);
+    assert!(!saved.is_made());
+    let mut transform = Transform::default();
+    let load = Action::BedMesh(MeshChange::Load("cold".into()));
+    transform.set(&load, &config.profiles).unwrap();
+    assert!(saved.is_made());
+    assert!(std::sync::Arc::ptr_eq(&saved.mesh().unwrap(), &saved.mesh().unwrap()));
+    assert_eq!(crate::journal::machine_check(&config), check);
+    assert_eq!(config, machine_with("", 0.3));
+    assert_ne!(config, machine_with("", 0.300_001));
+    assert_ne!(crate::journal::machine_check(&machine_with("", 0.300_001)), check);
+}
+
+#[test]
+fn a_mesh_of_which_only_the_surface_shows_that_it_cannot_be_used_is_told_when_it_is_loaded() {
+    let config = machine_with("fade_end: 10\nfade_target: 0.9", 0.3);
+    let load = Action::BedMesh(MeshChange::Load("cold".into()));
+    let problem = Transform::default().set(&load, &config.profiles).unwrap_err();
+    assert!(
+        problem.contains("[bed_mesh cold] cannot be used: fade_target 0.900 mm is not between"),
+        "{problem}"
+    );
 }

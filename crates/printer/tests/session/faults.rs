@@ -79,7 +79,7 @@ fn a_job_with_a_macro_must_be_confirmed() {
     let file = format!("{START}G1 X20 F6000\nPURGE_LINE\nG1 X30 E1\n{END}");
     fails(&file, ErrorCode::UnknownCommand, Some(9));
     for options in [
-        JobOptions { confirmed_lines: [9].into(), confirm_all: false, journal: None, start_line: None },
+        JobOptions { confirmed_lines: [9].into(), ..JobOptions::default() },
         JobOptions { confirm_all: true, ..JobOptions::default() },
     ] {
         let mut bench = Setup::default().ready();
@@ -88,8 +88,7 @@ fn a_job_with_a_macro_must_be_confirmed() {
         bench.job_done();
     }
     let mut bench = Setup::default().ready();
-    let other =
-        JobOptions { confirmed_lines: [8].into(), confirm_all: false, journal: None, start_line: None };
+    let other = JobOptions { confirmed_lines: [8].into(), ..JobOptions::default() };
     bench.start_with(&file, other).unwrap();
     bench.job_over();
     bench.failed(ErrorCode::UnknownCommand, Some(9));

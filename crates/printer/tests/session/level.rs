@@ -2,8 +2,10 @@
 
 use printer::{
     error::ErrorCode,
+    interruption::Survey,
     journal::Journal,
     session::{Event, JobOptions, JobStatus, PhaseName, Request, ScheduledMove},
+    transform::TransformRecord,
 };
 use units::Mm;
 use virtual_printer::BoardProfile;
@@ -11,8 +13,9 @@ use virtual_printer::BoardProfile;
 use crate::{
     attach::{die, file, setup, steps, take_up},
     bench::{Bench, Setup},
+    machine,
     print::squares,
-    start::paused,
+    start::{paused, paused_with},
 };
 
 /// A bed that is deepest in its middle, and a machine that leans.
@@ -173,31 +176,93 @@ fn a_print_that_begins_with_a_line_goes_above_the_bed_that_it_has() {
     for &line in lines.iter().step_by(4) {
         let mut bench = setup.ready();
         paused(&mut bench, &file, line);
-        bench.home();
-        bench.ask(Request::Resume);
-        bench.job_over();
-        bench.job_done();
-        let made = moves(&bench);
-        let tail = |moves: &[ScheduledMove]| -> Vec<ScheduledMove> {
-            moves.iter().filter(|mv| mv.line >= line).copied().collect()
-        };
-        let (expected, tail) = (tail(&whole), tail(&made));
-        assert_eq!(tail.len(), expected.len(), "{line}");
-        for (made, expected) in tail.iter().zip(&expected) {
-            let near = |a: [f64; 4], b: [f64; 4]| (0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-6);
-            assert!(
-                near(made.from, expected.from) && near(made.to, expected.to),
-                "{line}: {made:?} {expected:?}"
-            );
-        }
-        // The way there leads above what has been printed by then, by the motors' own heights.
-        let printed = whole.iter().filter(|mv| mv.line > 0 && mv.line < line && mv.to[3] > mv.from[3]);
-        let top = printed.fold(0.0, |top: f64, mv| top.max(mv.to[2]).max(mv.from[2]));
-        let ways = made.iter().filter(|mv| mv.line == 0);
-        for way in ways.filter(|way| way.from[0] != way.to[0] || way.from[1] != way.to[1]) {
-            assert!(way.from[2].min(way.to[2]) >= top + 1.9, "{line}: {way:?} {top}");
-        }
+        goes_on_as(&whole, &mut bench, line);
     }
+}
+
+/// A bench that waits to begin with a line makes what a whole print makes from there on.
+fn goes_on_as(whole: &[ScheduledMove], bench: &mut Bench, line: u32) {
+    bench.home();
+    bench.ask(Request::Resume);
+    bench.job_over();
+    bench.job_done();
+    let made = moves(bench);
+    let tail = |moves: &[ScheduledMove]| -> Vec<ScheduledMove> {
+        moves.iter().filter(|mv| mv.line >= line).copied().collect()
+    };
+    let (expected, tail) = (tail(whole), tail(&made));
+    assert_eq!(tail.len(), expected.len(), "{line}");
+    for (made, expected) in tail.iter().zip(&expected) {
+        let near = |a: [f64; 4], b: [f64; 4]| (0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-6);
+        assert!(
+            near(made.from, expected.from) && near(made.to, expected.to),
+            "{line}: {made:?} {expected:?}"
+        );
+    }
+    // The way there leads above what has been printed by then, by the motors' own heights.
+    let printed = whole.iter().filter(|mv| mv.line > 0 && mv.line < line && mv.to[3] > mv.from[3]);
+    let top = printed.fold(0.0, |top: f64, mv| top.max(mv.to[2]).max(mv.from[2]));
+    let ways = made.iter().filter(|mv| mv.line == 0);
+    for way in ways.filter(|way| way.from[0] != way.to[0] || way.from[1] != way.to[1]) {
+        assert!(way.from[2].min(way.to[2]) >= top + 1.9, "{line}: {way:?} {top}");
+    }
+}
+
+/// After a loss of power nobody need remember what had been loaded by hand: the journal does.
+#[test]
+fn what_was_loaded_by_hand_is_in_force_again_where_an_interrupted_print_begins() {
+    let setup = levelled(BoardProfile::rp2040());
+    let file = squares(3);
+    let load = "BED_MESH_PROFILE LOAD=cold\nSKEW_PROFILE LOAD=lean";
+    let journaled = || JobOptions { journal: Some(9), ..JobOptions::default() };
+    let mut bench = setup.ready();
+    bench.gcode(load);
+    bench.start_with(&file, journaled()).unwrap();
+    bench.job_done();
+    let (whole, mut journal) = (moves(&bench), bench.journal.clone());
+    let lines: Vec<u32> = whole.iter().map(|mv| mv.line).filter(|&line| line > 8).collect();
+    for line in [lines[0], lines[lines.len() / 2]] {
+        // Where it was does not matter here, nor that it has come to its end.
+        let began = journal.lines().next().unwrap().to_owned() + "\n";
+        let config = machine::config(&setup.config, &setup.board);
+        let mut survey = Survey::new(&config, Journal::read(began.as_bytes()).unwrap()).unwrap();
+        for piece in file.as_bytes().chunks(100) {
+            survey.feed(&piece[..piece.len().min(survey.wants())]);
+            while survey.advance().unwrap() {}
+        }
+        survey.end();
+        while survey.advance().unwrap() {}
+        let found = survey.report().unwrap();
+        let mut bench = setup.ready();
+        let options = JobOptions { start_line: Some(line), transform: Some(found.transform), ..journaled() };
+        paused_with(&mut bench, &file, options);
+        goes_on_as(&whole, &mut bench, line);
+        // The next interruption knows it, too.
+        journal.clone_from(&bench.journal);
+    }
+    // Begun as it is, it has what is in force, which is nothing.
+    let mut bench = setup.ready();
+    paused(&mut bench, &file, lines[0]);
+    bench.home();
+    bench.ask(Request::Resume);
+    bench.job_done();
+    assert!(
+        moves(&bench)
+            .iter()
+            .filter(|mv| mv.line > 0)
+            .all(|mv| mv.to[2] == mv.from[2] || mv.to[0] == mv.from[0])
+    );
+    // From its beginning it gets the same, and a mesh that is gone is told.
+    let with = |mesh: &str| {
+        let transform = TransformRecord { mesh: Some(mesh.into()), ..TransformRecord::default() };
+        JobOptions { transform: Some(transform), ..journaled() }
+    };
+    let mut bench = setup.ready();
+    let error = bench.start_with(&file, with("warm")).unwrap_err();
+    assert_eq!(error.code, ErrorCode::NoSuchProfile);
+    bench.start_with(&file, with("cold")).unwrap();
+    bench.job_done();
+    assert!(moves(&bench).iter().any(|mv| mv.line > 8 && mv.to[2] != mv.from[2] && mv.to[0] != mv.from[0]));
 }
 
 #[test]

@@ -1,13 +1,13 @@
 //! The machine that is printed on: small, quick to home and quick to heat.
 
 use printer::{
-    config::{self, HeaterConfig, MotorConfig, PinSpec, PrinterConfig, StepperConfig},
+    config::{self, HeaterConfig, Kinematics, MotorConfig, PinSpec, PrinterConfig, StepperConfig},
     machine::{EXTRUDER, MOTOR_NAMES},
 };
 use units::{Celsius, Mm, Ohms};
 use virtual_printer::{
-    BoardProfile, Endstop, Fan, Filament, Heater, Machine, Mechanics, Motor, Plant, Sensor, Side, Thermistor,
-    Wire,
+    BoardProfile, Endstop, Fan, Filament, Gantry, Heater, Machine, Mechanics, Motor, Plant, Sensor, Side,
+    Thermistor, Wire,
 };
 
 pub(crate) const CONFIG: &str = "
@@ -105,9 +105,15 @@ pub(crate) fn config(text: &str, board: &BoardProfile) -> PrinterConfig {
 
 /// What is wired to the board's pins.
 pub(crate) fn parts(config: &PrinterConfig) -> Machine {
-    let mut machine = Machine::default();
+    let mut machine = Machine { gantry: gantry(config), ..Machine::default() };
+    let starts: [f64; 3] = core::array::from_fn(|axis| start(axis, &config.steppers[axis]));
+    let belts = machine.gantry.motors(starts);
     for (axis, stepper) in config.steppers.iter().enumerate() {
-        machine.motors.push(axis_motor(axis, stepper));
+        let mut own = axis_motor(axis, stepper);
+        if machine.gantry.is_coupled() {
+            (own.start, own.frame) = (Mm(belts[axis]), None);
+        }
+        machine.motors.push(own);
         machine.endstops.push(Endstop {
             name: MOTOR_NAMES[axis].to_owned(),
             wire: wire(&stepper.endstop_pin),
@@ -129,13 +135,30 @@ pub(crate) fn parts(config: &PrinterConfig) -> Machine {
     machine
 }
 
+/// How the machine is built: by belts, or with a motor for each axis.
+pub(crate) fn gantry(config: &PrinterConfig) -> Gantry {
+    match config.printer.kinematics {
+        Kinematics::Cartesian => Gantry::Cartesian,
+        Kinematics::CoreXy => Gantry::CoreXy,
+        Kinematics::CoreXz => Gantry::CoreXz,
+        Kinematics::HybridCoreXy => Gantry::HybridCoreXy,
+        Kinematics::HybridCoreXz => Gantry::HybridCoreXz,
+        Kinematics::Delta(_) => panic!("these benches have no towers"),
+    }
+}
+
+/// Where an axis stands at power-up: not far from its endstop, so that homing is quick.
+fn start(axis: usize, stepper: &StepperConfig) -> f64 {
+    let endstop = stepper.position_endstop.0;
+    let away = if axis == 2 { 6.0 } else { 15.0 };
+    if stepper.homing_positive_dir { endstop - away } else { endstop + away }
+}
+
 fn axis_motor(axis: usize, stepper: &StepperConfig) -> Motor {
     let mm_per_rotation = stepper.motor.rotation_distance.0;
     let mechanics = Mechanics::nema17(stepper.motor.microsteps, mm_per_rotation, 0.4);
     let endstop = stepper.position_endstop.0;
-    // Not far from its endstop, so that homing is quick.
-    let away = if axis == 2 { 6.0 } else { 15.0 };
-    let start = if stepper.homing_positive_dir { endstop - away } else { endstop + away };
+    let start = start(axis, stepper);
     let frame = (stepper.position_min.0.min(endstop) - 3.0, stepper.position_max.0.max(endstop) + 3.0);
     motor(axis, &stepper.motor, mechanics, start, Some(frame))
 }

@@ -5,6 +5,7 @@ mod asked_again;
 mod attach;
 mod bench;
 mod console;
+mod coupled;
 mod faults;
 mod filters;
 mod heaters;

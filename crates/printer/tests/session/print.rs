@@ -66,8 +66,7 @@ fn a_job_is_printed_and_leaves_the_machine_as_the_file_says() {
 #[test]
 fn a_hot_end_that_stays_hot_by_intent_is_confirmed() {
     let mut bench = Setup::default().ready();
-    let options =
-        JobOptions { confirmed_lines: [9].into(), confirm_all: false, journal: None, start_line: None };
+    let options = JobOptions { confirmed_lines: [9].into(), ..JobOptions::default() };
     bench.start_with(&format!("{START}G1 X20 F6000\nG1 X30 E1\n"), options).unwrap();
     bench.job_over();
     bench.job_done();

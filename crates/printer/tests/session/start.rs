@@ -28,7 +28,12 @@ fn moves(bench: &Bench) -> Vec<ScheduledMove> {
 
 #[track_caller]
 pub(crate) fn paused(bench: &mut Bench, file: &str, line: u32) {
-    bench.start_with(file, at_line(line)).unwrap();
+    paused_with(bench, file, at_line(line));
+}
+
+#[track_caller]
+pub(crate) fn paused_with(bench: &mut Bench, file: &str, options: JobOptions) {
+    bench.start_with(file, options).unwrap();
     bench.until("the line", 20.0, |bench| bench.session.job_status() == JobStatus::Paused);
 }
 

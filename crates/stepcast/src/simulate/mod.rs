@@ -63,6 +63,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
         confirm_all: args.confirm_all,
         journal: Some(JOURNAL),
         start_line: start_line.filter(|&line| line > 1),
+        transform: None,
     };
     let setup = Setup {
         config,
@@ -202,12 +203,7 @@ mod tests {
         let refusal = Refusal::of(&found, &JobOptions::default()).unwrap();
         assert_eq!(refusal.reason.line, Some(2));
         assert_eq!(refusal.blocking.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [2, 3]);
-        let one = JobOptions {
-            confirmed_lines: BTreeSet::from([2]),
-            confirm_all: false,
-            journal: None,
-            start_line: None,
-        };
+        let one = JobOptions { confirmed_lines: BTreeSet::from([2]), ..JobOptions::default() };
         assert_eq!(Refusal::of(&found, &one).unwrap().reason.line, Some(3));
         let all = JobOptions { confirm_all: true, ..JobOptions::default() };
         assert!(Refusal::of(&found, &all).is_none());

@@ -64,8 +64,12 @@ pub(super) struct Observer {
     switch_mm: [f64; 3],
     endstop_mm: [f64; 3],
     gcode: GcodePath<Input>,
-    /// Steps of all moves that were scheduled.
+    /// Steps of all moves that were scheduled …
     pub(super) planned: [u64; MOTORS],
+    /// … of which so many may be made or not: there and back, where a motor comes to the middle of two positions and turns.
+    pub(super) unsure: [u64; MOTORS],
+    /// Which way each motor went last.
+    heading: [f64; MOTORS],
     /// Motors whose path is filtered: they make steps of their own, and end where the file wants them.
     filtered: [bool; MOTORS],
     /// Where the last move ends that was made for the file.
@@ -133,6 +137,8 @@ impl Observer {
             endstop_mm,
             gcode,
             planned: [0; MOTORS],
+            unsure: [0; MOTORS],
+            heading: [0.0; MOTORS],
             filtered: filtered(config, &gantry),
             end: None,
             moves: 0,
@@ -344,9 +350,18 @@ impl Observer {
             let distance = self.step_distance_mm[motor];
             let along = |way: [f64; 3]| self.gantry.motors(way)[motor];
             let turn = arc.filter(|_| motor < EXTRUDER).and_then(|arc| arc.turning_point(along));
-            let turn = grid(turn.unwrap_or(from[motor]), distance);
-            self.planned[motor] +=
-                turn.abs_diff(grid(from[motor], distance)) + grid(to[motor], distance).abs_diff(turn);
+            let turn = turn.unwrap_or(from[motor]);
+            for (begin, end) in [(from[motor], turn), (turn, to[motor])] {
+                self.planned[motor] += grid(begin, distance).abs_diff(grid(end, distance));
+                if begin == end {
+                    continue;
+                }
+                let turns = (end - begin) * self.heading[motor] < 0.0;
+                if turns && is_half_way(begin, distance) {
+                    self.unsure[motor] += 2;
+                }
+                self.heading[motor] = (end - begin).signum();
+            }
         }
     }
 
@@ -413,9 +428,19 @@ fn filtered(config: &PrinterConfig, gantry: &Gantry) -> [bool; MOTORS] {
     [of(0), of(1), of(2), e]
 }
 
-/// The number of the motor position nearest to a place; one exactly half-way belongs to the upper one.
+/// An arc's path may be so far from the file's, in mm, and rounding besides.
+const ARC_ERROR_MM: f64 = 2e-6;
+
+/// Whether a place is in the middle of two motor positions, as far as an arc's place is known.
+fn is_half_way(position_mm: f64, step_distance_mm: f64) -> bool {
+    let steps = position_mm / step_distance_mm;
+    (steps - steps.floor() - 0.5).abs() * step_distance_mm <= ARC_ERROR_MM
+}
+
+/// The number of the motor position nearest to a place; one exactly half-way belongs to the upper one. Steps a mm are what
+/// counts, to the last bit.
 fn grid(position_mm: f64, step_distance_mm: f64) -> i64 {
-    (position_mm / step_distance_mm + 0.5).floor() as i64
+    (position_mm * (1.0 / step_distance_mm) + 0.5).floor() as i64
 }
 
 #[cfg(test)]
@@ -428,5 +453,7 @@ mod tests {
         assert_eq!(grid(-0.5, 1.0), 0);
         assert_eq!(grid(0.49, 1.0), 0);
         assert_eq!(grid(-0.51, 1.0), -1);
+        assert!(is_half_way(1.006_25, 0.0125) && is_half_way(-1.006_251, 0.0125));
+        assert!(!is_half_way(1.006_26, 0.0125) && !is_half_way(1.0, 0.0125));
     }
 }

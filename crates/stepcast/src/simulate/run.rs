@@ -2,6 +2,7 @@
 
 mod reckoning;
 mod user;
+mod watch;
 
 use std::time::Instant;
 
@@ -9,11 +10,11 @@ use printer::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
     journal::{Journal, JournalError},
-    machine::{EXTRUDER, MOTOR_NAMES},
     session::{JobOptions, JobStatus, Request, Session},
 };
 use units::{Celsius, Hertz, Seconds, Ticks};
-use virtual_printer::{BoardProfile, Faults, HeaterView, HostStall, VirtualPrinter};
+use virtual_printer::{BoardProfile, Faults, HostStall, VirtualPrinter};
+use watch::SAMPLE_INTERVAL;
 
 use super::{
     course::Course,
@@ -30,18 +31,10 @@ use crate::{console::Progress, input::Input};
 const WAKE_MIN: Seconds = Seconds(50e-6);
 /// After the end the machine is watched for so long: long enough for the board's own watch over its heaters.
 pub(super) const AFTER: Seconds = Seconds(6.0);
-/// A print in which nothing happens for so long is given up.
-const STALL_MAX: Seconds = Seconds(6.0 * 3600.0);
 /// A pause that is asked for so shortly before the print's end need not come.
 const PAUSE_COMES: Seconds = Seconds(1.0);
-/// How often the nozzle's temperature is looked at.
-const SAMPLE_INTERVAL: Seconds = Seconds(0.1);
-/// The nozzle counts as extruding for so long after a step of the extruder's.
-const EXTRUDING: Seconds = Seconds(0.25);
 /// The path may be this far off, or by a step of each axis where that is more.
 pub(crate) const PATH_ERROR_MAX_MM: f64 = 0.02;
-/// A heater that is held at its stand-by is this much above it at times.
-const STANDBY_BAND_C: f64 = 5.0;
 /// The progress bar is drawn this often, in rounds of the loop.
 const ROUNDS_PER_DRAW: u32 = 256;
 
@@ -407,48 +400,6 @@ impl Simulation {
         Ok(true)
     }
 
-    fn sample(&mut self, now: Ticks) {
-        self.next_sample = now + self.ticks(SAMPLE_INTERVAL);
-        let extruding = self.ticks(EXTRUDING);
-        let state = self.printer.state();
-        let motion_now = self.printer.motion_now();
-        let tally = self.printer.recorder_mut();
-        // Up to now, no pulse is missing. A board that has stopped everything executes no line any more.
-        if state.shutdown.is_none() {
-            tally.path.settle(motion_now);
-        }
-        let extruding = tally.extruded_at.is_some_and(|at| at + extruding >= now);
-        let is_hot = |heater: &&HeaterView| {
-            let standby = self.standby.iter().find(|(name, _)| *name == heater.name);
-            standby.is_none_or(|(_, standby)| heater.temperature.0 > standby.0 + STANDBY_BAND_C)
-        };
-        let mut heated = state.heaters.iter().filter(|heater| heater.duty > 0.0).peekable();
-        if heated.peek().is_some() {
-            self.aftermath.heated = now;
-        }
-        if heated.any(|heater| is_hot(&heater)) {
-            self.aftermath.overheated = now;
-        }
-        let time = self.clock.at(now);
-        self.follow(motion_now, time);
-        if self.stage == Stage::Printing
-            && let Some(nozzle) = state.heaters.iter().find(|heater| heater.name == MOTOR_NAMES[EXTRUDER])
-        {
-            self.observer.nozzle.sample(time, nozzle.temperature, extruding);
-        }
-    }
-
-    /// How the host's idea of the board's clock fares, and what else may not grow.
-    fn follow(&mut self, motion_now: Ticks, time: Seconds) {
-        if self.away_until().is_none()
-            && let Some(believed) = self.session.motion_clock(time)
-        {
-            let error = believed.0 as f64 - motion_now.0 as f64;
-            self.course.clock_error(Seconds(error / f64::from(self.printer.profile().clock.0)));
-        }
-        self.course.pass(self.virtual_time(), self.journal.len());
-    }
-
     /// Until when the host does nothing, if it is held up now or gone.
     fn away_until(&mut self) -> Option<Ticks> {
         let now = self.printer.now();
@@ -463,26 +414,6 @@ impl Simulation {
         }
         while self.stalls.pop_if(|(_, until)| *until <= now).is_some() {}
         self.stalls.last().filter(|(from, _)| *from <= now).map(|(_, until)| *until)
-    }
-
-    fn check_stall(&self) -> anyhow::Result<()> {
-        let still = self.printer.now().saturating_sub(self.observer.last_change);
-        if still > self.ticks(STALL_MAX) {
-            anyhow::bail!(
-                "the simulated print did nothing for {} hours of its time after line {}",
-                STALL_MAX.0 / 3600.0,
-                self.observer.line
-            );
-        }
-        Ok(())
-    }
-
-    fn give_up_late(&mut self) {
-        let is_late = self.time_max.is_some_and(|max| self.virtual_time() > max);
-        if is_late && !matches!(self.stage, Stage::Watching(_)) {
-            self.is_overdue = true;
-            self.end();
-        }
     }
 
     fn ticks(&self, duration: Seconds) -> Ticks {

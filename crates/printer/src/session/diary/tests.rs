@@ -11,6 +11,7 @@ fn diary() -> Diary {
         made: None,
         told_z: f64::NAN,
         height: None,
+        off_mm: [0.0; 3],
         since_power_up: true,
         parked: None,
     };

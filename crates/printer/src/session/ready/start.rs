@@ -39,7 +39,10 @@ impl Ready {
     /// Has a job begin with a line. The planner that is at hand goes on moving the machine until then.
     pub(in crate::session) fn begin_at(&mut self, job: &mut Job, line: u32) -> Result<(), PrinterError> {
         let mut planner = Box::new(Planner::new(&self.config, self.board.clock)?);
-        planner.set_same_transform(&self.planner);
+        match &job.options.transform {
+            Some(record) => planner.set_recorded_transform(record)?,
+            None => planner.set_same_transform(&self.planner),
+        }
         planner.begin_job(&mut job.source);
         let endstops = self.config.steppers.each_ref().map(|stepper| stepper.position_endstop.0);
         job.skip = Some(Skip::new(line, endstops));

@@ -75,7 +75,7 @@ impl Ready {
         let mut ready = Self::with_planner(config, board, taken.planner, now);
         let counts = queue.motors.map(|motor| motor.position);
         let made = |motor: usize| if inverted[motor] { -taken.made[motor] } else { taken.made[motor] };
-        (ready.diary, ready.rate) = (diary, Rate::unknown());
+        (ready.diary, ready.rate, ready.off_mm) = (diary, Rate::unknown(), taken.off_mm);
         let run = ready.stream.take_up(&TakenUp {
             start,
             end: taken.end.map(|end| start + end),

@@ -55,7 +55,7 @@ impl Ready {
         let mut diary = Diary::default();
         diary.take_up(&taken, now);
         let mut ready = Self::with_planner(config, board, planner, now);
-        (ready.diary, ready.rate) = (diary, Rate::unknown());
+        (ready.diary, ready.rate, ready.off_mm) = (diary, Rate::unknown(), taken.off_mm);
         ready.planner.set_same_transform(&taken.planner);
         ready.planner.stand_at(here);
         let homed = taken.planner.guard.homed();

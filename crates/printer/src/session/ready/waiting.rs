@@ -212,6 +212,7 @@ impl Ready {
                     let steps = core::array::from_fn(own);
                     self.events.push(Event::Homed { axis: at, position_mm, steps });
                 }
+                self.diary.off(self.off_mm);
                 self.home_next();
             }
             Ok(Wish::Cancelled) => {

@@ -207,10 +207,8 @@ impl Rig {
         Ok(())
     }
 
-    fn start(&mut self, journal: u32, start_line: Option<u32>) -> anyhow::Result<()> {
+    fn start(&mut self, options: JobOptions) -> anyhow::Result<()> {
         (self.fed, self.has_ended, self.is_done) = (0, false, false);
-        let options =
-            JobOptions { confirm_all: true, journal: Some(journal), start_line, ..JobOptions::default() };
         let now = self.now();
         self.session.start_job(options, now)?;
         Ok(())
@@ -219,7 +217,7 @@ impl Rig {
     /// Prints the file from its beginning, to its end or until the power goes.
     pub(super) fn print(&mut self) -> anyhow::Result<()> {
         self.until("the board", |rig| rig.session.phase() == PhaseName::Ready)?;
-        self.start(1, None)?;
+        self.start(JobOptions { confirm_all: true, journal: Some(1), ..JobOptions::default() })?;
         self.until("the end of the print", |rig| {
             let is_gone = rig.host_dies.is_some_and(|dies| rig.printer.now() >= dies);
             let is_lost = rig.error.is_some() && rig.loses.is_some_and(|at| rig.age() >= at);
@@ -269,7 +267,13 @@ impl Rig {
             // There is nothing left of it, or nothing has been made.
             return Ok(None);
         }
-        self.start(2, Some(found.start_line))?;
+        self.start(JobOptions {
+            confirm_all: true,
+            journal: Some(2),
+            start_line: Some(found.start_line),
+            transform: Some(found.transform.clone()),
+            ..JobOptions::default()
+        })?;
         self.until("the line", |rig| rig.session.job_status() == JobStatus::Paused)?;
         self.wait(Seconds(1.0));
         if !self.is_quiet(pulses) {
