@@ -4,16 +4,15 @@
 //! nearer to each other than half their true gap. Every clock is integer arithmetic from the clock before, and every
 //! window lies around the true time: errors never add up.
 //!
-//! Windows are tried at growing distances, and where one cannot be passed any more, those before it; what is given out passes
-//! the windows of all its steps. So most steps cost no more than their time and their window.
+//! Each command is as long as any: it goes on until no interval and `add` pass the next window too.
 //!
 //! Whether a command is closed depends on the step times alone, never on when they become known: a later step either
 //! closes it by its distance or could have gone on with it. Only where another motor's pieces run out of room is one
 //! closed early, after a number of moves that is always the same.
 
 use crate::crossing::Piece;
-use crate::stabbing::{FIT_STEPS_MAX, Fit, Stabbing, larger, smaller};
-use crate::windows::{Gaps, Steps, append_errors, shortest_gap};
+use crate::stabbing::{FIT_STEPS_MAX, Stabbing, larger, smaller};
+use crate::windows::{Steps, append_errors, longest_gap};
 use crate::{IDLE_TICKS_MAX, StepCommand, StepCommandKind};
 use std::collections::VecDeque;
 use units::{Seconds, Ticks};
@@ -32,9 +31,9 @@ const GAP_MIN: Seconds = Seconds(0.5e-6);
 /// The same for slow clocks, in ticks: windows must hold an integer.
 const GAP_MIN_TICKS: f64 = 4.0;
 /// The share of the gap to a neighbour by which a step may be off.
-const GAP_SHARE: f64 = 0.25;
-/// After `n` steps that a command passes, the window `2 + n / STRIDE` further on is tried.
-const STRIDE: u32 = 8;
+const GAP_SHARE: f64 = 0.25 * WINDOW_SHARE;
+/// The share of a window that is used: a slit's last digits are far below the rest.
+const WINDOW_SHARE: f64 = 1.0 - 1e-9;
 /// Times of steps that are given out stay in the buffer up to this many.
 const GONE_MAX: usize = 1024;
 
@@ -90,7 +89,7 @@ impl Compressor {
     pub(crate) fn new(motor: usize, ticks_per_s: f64, max_error: Seconds) -> Self {
         Self {
             motor,
-            max_error: max_error.0 * ticks_per_s,
+            max_error: max_error.0 * ticks_per_s * WINDOW_SHARE,
             gap_min: gap_min_ticks(ticks_per_s),
             hold_max: STEP_HOLD_MAX.0 * ticks_per_s,
             span_max: RUN_SPAN_MAX.0 * ticks_per_s,
@@ -122,7 +121,7 @@ impl Compressor {
         self.base_time = f64::NEG_INFINITY;
         self.forget();
         self.told = None;
-        self.stabbing.clear();
+        self.stabbing = Stabbing::new();
         self.out.clear();
     }
 
@@ -186,17 +185,16 @@ impl Compressor {
         let times = &self.times[fresh - 1..];
         let known = self.errors.len();
         self.errors.push(self.error(self.gap_before, times[1] - times[0]));
-        let limits = Gaps { shortest: self.gap_min, longest: self.hold_max, record: self.tally.gap_min };
-        let (is_usual, is_shorter) =
-            append_errors(times, self.max_error, GAP_SHARE, &limits, &mut self.errors);
-        let span = times[times.len() - 1] - self.times[self.first];
-        if !(is_usual && span <= self.span_max) {
+        let shortest = append_errors(times, self.max_error, GAP_SHARE, &mut self.errors);
+        let last = times[times.len() - 1];
+        let is_usual = shortest >= self.gap_min
+            && last - self.times[self.first] <= self.span_max
+            && (last - times[0] <= self.hold_max || longest_gap(times) <= self.hold_max);
+        if !is_usual {
             self.errors.truncate(known);
             return false;
         }
-        if is_shorter {
-            self.tally.gap_min = shortest_gap(times);
-        }
+        self.tally.gap_min = smaller(self.tally.gap_min, shortest);
         self.gap_before = times[times.len() - 1] - times[times.len() - 2];
         self.fit_in();
         true
@@ -313,50 +311,32 @@ impl Compressor {
         (self.errors.len() - self.first) as u32
     }
 
-    /// Tries the window of waiting step number `count`, from 1.
-    fn take(&mut self, count: u32) -> bool {
-        let index = self.first + count as usize - 1;
-        let (ticks, error) = (self.times[index] - self.base_ticks, self.errors[index]);
-        self.stabbing.take(count, larger(ticks - error, 1.0), ticks + error)
-    }
-
-    /// Tries windows at growing distances as far as they are known, and closes commands that cannot go on.
+    /// Closes the commands that cannot go on, as far as windows are known.
     fn fit_in(&mut self) {
-        loop {
-            let passed = self.stabbing.count();
-            let next = FIT_STEPS_MAX.min(passed + if passed == 0 { 1 } else { 2 + passed / STRIDE });
-            if next > self.known() {
+        while self.known() > 0 {
+            if self.is_after_rest() {
+                self.emit_after_rest();
+            } else if self.extend() {
+                self.emit();
+            } else {
                 return;
             }
-            if passed == 0 && self.is_after_rest() {
-                self.emit_after_rest();
-            } else if next == passed || !self.take(next) {
-                self.refine(next);
-                self.emit();
-            }
         }
     }
 
-    /// Tries the last window of those that are known; whether any is.
+    fn extend(&mut self) -> bool {
+        let steps = steps_from(self.base_ticks, &self.times, &self.errors, self.first);
+        self.stabbing.extend(&steps)
+    }
+
+    /// Ends the search with the windows that are known; whether there are any.
     fn fit_rest(&mut self) -> bool {
-        let known = self.known();
-        if known == 0 {
+        if self.known() == 0 {
             return false;
         }
-        if self.stabbing.count() < known && !self.take(known) {
-            self.refine(known);
-        }
+        let steps = steps_from(self.base_ticks, &self.times, &self.errors, self.first);
+        self.stabbing.finish(&steps);
         true
-    }
-
-    /// The window of step number `failed` cannot be passed: finds the last before it that can.
-    fn refine(&mut self, mut failed: u32) {
-        while failed > self.stabbing.count() + 1 {
-            let middle = self.stabbing.count().midpoint(failed);
-            if !self.take(middle) {
-                failed = middle;
-            }
-        }
     }
 
     /// Gives out all steps; the window of the last is known.
@@ -370,43 +350,17 @@ impl Compressor {
         }
     }
 
-    /// Closes one command with the steps passed so far, or with the first of them.
+    /// Closes the command that was found.
     fn emit(&mut self) {
         let mut record = self.tally.error_max;
-        let fit = self.fit(&mut record).unwrap_or_else(|| self.fit_closely(&mut record));
+        let steps = steps_from(self.base_ticks, &self.times, &self.errors, self.first);
+        let fit = self.stabbing.fit(&steps, &mut record);
         let (interval, add, count) = (f64::from(fit.interval), f64::from(fit.add), f64::from(fit.count));
         // Floats hold these integers exactly.
         let clock = self.base_ticks + count * (interval + 0.5 * add * (count - 1.0));
         let kind =
             StepCommandKind::QueueStep { interval: fit.interval, count: fit.count as u16, add: fit.add };
         self.put(kind, clock as u64, fit.count as usize, record);
-    }
-
-    /// The steps that wait and whose windows are known.
-    fn steps(&self) -> Steps<'_> {
-        Steps {
-            base: self.base_ticks,
-            times: &self.times[self.first..self.errors.len()],
-            errors: &self.errors[self.first..],
-        }
-    }
-
-    /// A command for all steps passed so far.
-    fn fit(&self, record: &mut f64) -> Option<Fit> {
-        let last = self.times[self.first + self.stabbing.count() as usize - 1];
-        self.stabbing.fit(&self.steps(), last - self.base_ticks, record)
-    }
-
-    /// A window between those that were tried is in the way: tries them all.
-    fn fit_closely(&mut self, record: &mut f64) -> Fit {
-        let passed = self.stabbing.count();
-        self.stabbing.clear();
-        for count in 1..=passed {
-            if !self.take(count) {
-                break;
-            }
-        }
-        self.fit(record).unwrap_or_else(|| self.stabbing.fit_some(&self.steps(), record))
     }
 
     /// Whether the board's 32-bit clock cannot express how far the next step is.
@@ -450,4 +404,9 @@ impl Compressor {
         }
         self.stabbing.clear();
     }
+}
+
+/// The steps from index `first` on whose windows are known.
+fn steps_from<'a>(base: f64, times: &'a [f64], errors: &'a [f64], first: usize) -> Steps<'a> {
+    Steps { base, times: &times[first..errors.len()], errors: &errors[first..] }
 }

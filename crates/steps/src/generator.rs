@@ -98,9 +98,8 @@ pub struct StepGenerator<K = Cartesian> {
     /// What the move in hand adds to the axes and to a motor.
     paths: [Vec<Segment>; AXES],
     segments: Vec<Segment>,
-    /// What it adds to the motors, before it is accepted.
-    staged: Vec<(usize, Piece)>,
-    staged_counts: Vec<i64>,
+    /// Before it is accepted: how many pieces each motor had, and its grid position at the end of the new ones.
+    staged: Vec<(usize, i64)>,
 }
 
 impl<K: Kinematics> StepGenerator<K> {
@@ -148,7 +147,6 @@ impl<K: Kinematics> StepGenerator<K> {
             paths: Default::default(),
             segments: Vec::new(),
             staged: Vec::new(),
-            staged_counts: Vec::new(),
         })
     }
 
@@ -318,48 +316,57 @@ impl<K: Kinematics> StepGenerator<K> {
         }
     }
 
-    /// Works out the motors' shares of what has become known of the axes.
+    /// Works out the motors' shares of what has become known of the axes. Where that fails, they are taken back.
     fn stage(&mut self) -> Result<(), PushError> {
         self.staged.clear();
-        self.staged_counts.clear();
-        let known = self.axes.each_ref().map(|axis| axis.known);
         for index in 0..self.motors.len() {
-            let motor = &mut self.motors[index];
-            let mut count = motor.count;
-            let segments = if let Some(axis) = motor.axis {
-                &self.paths[axis]
-            } else {
-                self.segments.clear();
-                motor.merge.take(&self.paths, &known, |stretch| {
-                    self.kinematics.motor_segments(index, stretch, &mut self.segments);
-                });
-                &self.segments
-            };
-            let rate_max = 1.0 / gap_min_ticks(motor.grid.ticks_per_s);
-            for segment in segments {
-                let mut is_fast = false;
-                // A stretch without a step may claim any speed.
-                let is_possible = motor.grid.peak_rate(segment) <= rate_max;
-                motor.grid.split(segment, &mut count, &mut |piece| {
-                    is_fast |= !is_possible || piece.is_faster_than(rate_max);
-                    self.staged.push((index, piece));
-                });
-                if is_fast {
-                    return Err(PushError::StepRate { motor: index });
+            let before = self.motors[index].pieces.len();
+            let (count, is_possible) = self.stage_motor(index);
+            self.staged.push((before, count));
+            if !is_possible {
+                for (motor, &(before, _)) in self.motors.iter_mut().zip(&self.staged) {
+                    motor.pieces.truncate(before);
                 }
+                return Err(PushError::StepRate { motor: index });
             }
-            self.staged_counts.push(count);
         }
         Ok(())
     }
 
-    /// Gives the motors what was staged.
-    fn accept(&mut self) {
-        for (motor, piece) in self.staged.drain(..) {
-            self.motors[motor].pieces.push_back(piece);
+    /// One motor's share: its grid position after that, and whether it can step that fast.
+    fn stage_motor(&mut self, index: usize) -> (i64, bool) {
+        let Motor { grid, pieces, merge, axis, count, .. } = &mut self.motors[index];
+        let mut count = *count;
+        let segments = if let Some(axis) = *axis {
+            &self.paths[axis]
+        } else {
+            self.segments.clear();
+            let known = self.axes.each_ref().map(|axis| axis.known);
+            merge.take(&self.paths, &known, |stretch| {
+                self.kinematics.motor_segments(index, stretch, &mut self.segments);
+            });
+            &self.segments
+        };
+        let rate_max = 1.0 / gap_min_ticks(grid.ticks_per_s);
+        for segment in segments {
+            let mut is_fast = false;
+            // A stretch without a step may claim any speed.
+            let is_possible = grid.peak_rate(segment) <= rate_max;
+            grid.split(segment, &mut count, &mut |piece| {
+                is_fast |= !is_possible || piece.is_faster_than(rate_max);
+                pieces.push_back(piece);
+            });
+            if is_fast {
+                return (count, false);
+            }
         }
-        for (index, motor) in self.motors.iter_mut().enumerate() {
-            motor.count = self.staged_counts[index];
+        (count, true)
+    }
+
+    /// The motors keep what was staged.
+    fn accept(&mut self) {
+        for (motor, &(_, count)) in self.motors.iter_mut().zip(&self.staged) {
+            motor.count = count;
             let known = motor.axis.map_or(motor.merge.time(), |axis| self.axes[axis].known);
             motor.known = larger(motor.known, known * motor.grid.ticks_per_s);
         }

@@ -11,8 +11,7 @@
 //! hysteresis and nothing accumulates: after any move the count is that of the move's end, rounded.
 //!
 //! The packing is line stabbing: [`generator`](StepGenerator) → `crossing` (step times) → `compressor` (windows around
-//! them) → `stabbing` (the longest quadratic through the windows; after J. O'Rourke, "An on-line algorithm for fitting
-//! straight lines between data ranges", 1981).
+//! them) → `stabbing` (the longest quadratic with whole coefficients through the windows).
 
 mod advance;
 mod bent;

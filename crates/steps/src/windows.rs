@@ -1,12 +1,12 @@
-//! Arithmetic over runs of steps at once: their windows, and which intervals pass all of them.
+//! Arithmetic over runs of steps at once: their windows, and which intervals pass them.
 //!
 //! Written over fixed lanes, so that the compiler uses vector instructions where there are any; the results are the same
 //! without. Times in ticks. Divisions and roots are those of IEEE 754, so they are the same on every machine.
 
-use crate::stabbing::{has_integer, larger, smaller};
+use crate::stabbing::{Block, Candidate, floor, has_integer, larger, smaller};
 
 /// Numbers worked on at a time: two registers of SSE2.
-const LANES: usize = 4;
+pub(crate) const LANES: usize = 4;
 type Lanes = [f64; LANES];
 
 /// Successive steps one way, with what each may be off.
@@ -20,8 +20,8 @@ pub(crate) struct Steps<'a> {
     pub(crate) errors: &'a [f64],
 }
 
-/// The numbers of the steps in a chunk of lanes, from 1.
-const NUMBERS: Lanes = [1.0, 2.0, 3.0, 4.0];
+/// The numbers of lanes.
+const NUMBERS: Lanes = [0.0, 1.0, 2.0, 3.0];
 
 #[inline]
 fn map(a: Lanes, f: impl Fn(f64) -> f64) -> Lanes {
@@ -33,129 +33,188 @@ fn map2(a: Lanes, b: Lanes, f: impl Fn(f64, f64) -> f64) -> Lanes {
     core::array::from_fn(|lane| f(a[lane], b[lane]))
 }
 
+/// All of them in one, by halves.
+#[inline]
+fn reduce(a: Lanes, f: impl Fn(f64, f64) -> f64) -> f64 {
+    f(f(a[0], a[2]), f(a[1], a[3]))
+}
+
 impl Steps<'_> {
     /// The first `count` of them.
     pub(crate) fn first(&self, count: usize) -> Self {
         Self { times: &self.times[..count], errors: &self.errors[..count], ..*self }
     }
 
-    /// The lowest and the highest interval (not whole) with which step number `k` comes within its window, for this `add`.
-    fn bounds(&self, k: f64, time: f64, error: f64, add: f64) -> (f64, f64) {
-        let (middle, inverse, rise) = (time - self.base, 1.0 / k, 0.5 * add * (k - 1.0));
-        ((middle - error) * inverse - rise, (middle + error) * inverse - rise)
-    }
-
-    /// The intervals that pass all windows with this `add`: none where the first is above the second.
-    pub(crate) fn intervals(&self, add: f64) -> (f64, f64) {
-        let (mut lows, mut highs) = ([1.0; LANES], [f64::INFINITY; LANES]);
-        let mut numbers = NUMBERS;
-        let (times, late_times) = self.times.as_chunks::<LANES>();
-        let (errors, late_errors) = self.errors.as_chunks::<LANES>();
-        let (base, half) = (self.base, 0.5 * add);
-        for (&times, &errors) in times.iter().zip(errors) {
-            let middles = map(times, |time| time - base);
-            let inverses = map(numbers, |k| 1.0 / k);
-            let rises = map(numbers, |k| half * (k - 1.0));
-            let low =
-                map2(map2(map2(middles, errors, |a, b| a - b), inverses, |a, b| a * b), rises, |a, b| a - b);
-            let high =
-                map2(map2(map2(middles, errors, |a, b| a + b), inverses, |a, b| a * b), rises, |a, b| a - b);
-            lows = map2(low, lows, larger);
-            highs = map2(high, highs, smaller);
-            numbers = map(numbers, |k| k + LANES as f64);
-        }
-        for ((&time, &error), &k) in late_times.iter().zip(late_errors).zip(&numbers) {
-            let (low, high) = self.bounds(k, time, error, add);
-            lows[0] = larger(low, lows[0]);
-            highs[0] = smaller(high, highs[0]);
-        }
-        (lows.into_iter().fold(1.0, larger), highs.into_iter().fold(f64::INFINITY, smaller))
-    }
-
-    /// As many of the first steps as one whole interval passes with this `add`, and its range.
-    pub(crate) fn prefix(&self, add: f64) -> (usize, (f64, f64)) {
-        let mut reached = (1.0, f64::INFINITY);
-        for (index, (&time, &error)) in self.times.iter().zip(self.errors).enumerate() {
-            let (low, high) = self.bounds((index + 1) as f64, time, error, add);
-            let next = (larger(reached.0, low), smaller(reached.1, high));
-            if !has_integer(next.0, next.1) {
-                return (index, reached);
-            }
-            reached = next;
-        }
-        (self.times.len(), reached)
-    }
-
-    /// Whether all of them come within their windows with this `interval` and `add`, and whether any is farther than `record`
-    /// from its time.
-    pub(crate) fn check(&self, interval: f64, add: f64, record: f64) -> (bool, bool) {
-        let (base, half) = (self.base, 0.5 * add);
-        let (mut beyond, mut farther) = (0, 0);
-        for (index, (&time, &error)) in self.times.iter().zip(self.errors).enumerate() {
-            let off = off(index, time, interval, half, base);
-            beyond |= (error - off).to_bits();
-            farther |= (record - off).to_bits();
-        }
-        (!has_sign(beyond), has_sign(farther))
-    }
-
-    /// How far the farthest of them is from its time with this `interval` and `add`.
+    /// How far the farthest of them is from its time with this `interval` and `add`. Whole numbers and halves: exact in any
+    /// order.
     pub(crate) fn worst(&self, interval: f64, add: f64) -> f64 {
-        let off = |(index, &time): (usize, &f64)| off(index, time, interval, 0.5 * add, self.base);
-        self.times.iter().enumerate().map(off).fold(0.0, larger)
+        let (base, half) = (self.base, 0.5 * add);
+        let off =
+            |before: f64, time: f64| ((before + 1.0) * (interval + half * before) - (time - base)).abs();
+        let (chunks, late) = self.times.as_chunks::<LANES>();
+        let (mut worst, mut numbers) = ([0.0; LANES], NUMBERS);
+        for &times in chunks {
+            worst = map2(map2(numbers, times, off), worst, larger);
+            numbers = map(numbers, |number| number + LANES as f64);
+        }
+        let offs = numbers.iter().zip(late).map(|(&number, &time)| off(number, time));
+        offs.fold(reduce(worst, larger), larger)
     }
 }
 
-/// How far step `index` (from 0) is from its time. Whole numbers and halves: exact in any order.
+/// The windows of steps, each divided by the number of its step: upright slits, for lines over that number less one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Slits {
+    /// Lower ends, and whatever was there before beyond `count`.
+    lows: Vec<f64>,
+    /// Upper ends.
+    highs: Vec<f64>,
+    count: usize,
+}
+
+impl Slits {
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Slits there are.
+    pub(crate) const fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Adds the windows up to the one of step `count`.
+    pub(crate) fn fill(&mut self, steps: &Steps<'_>, count: usize) {
+        let known = self.count;
+        self.count = count;
+        if self.lows.len() < count {
+            self.lows.resize(2 * count, 0.0);
+            self.highs.resize(2 * count, 0.0);
+        }
+        let base = steps.base;
+        let (times, late_times) = steps.times[known..count].as_chunks::<LANES>();
+        let (errors, late_errors) = steps.errors[known..count].as_chunks::<LANES>();
+        let (lows, late_lows) = self.lows[known..count].as_chunks_mut::<LANES>();
+        let (highs, late_highs) = self.highs[known..count].as_chunks_mut::<LANES>();
+        let mut numbers = map(NUMBERS, |number| number + (known + 1) as f64);
+        for (((low, high), &times), &errors) in lows.iter_mut().zip(highs).zip(times).zip(errors) {
+            let inverses = map(numbers, |number| 1.0 / number);
+            let middles = map(times, |time| time - base);
+            *low = map2(map2(middles, errors, |a, b| a - b), inverses, |a, b| a * b);
+            *high = map2(map2(middles, errors, |a, b| a + b), inverses, |a, b| a * b);
+            numbers = map(numbers, |number| number + LANES as f64);
+        }
+        for ((((low, high), &time), &error), number) in
+            late_lows.iter_mut().zip(late_highs).zip(late_times).zip(late_errors).zip(numbers)
+        {
+            let (inverse, middle) = (1.0 / number, time - base);
+            *low = (middle - error) * inverse;
+            *high = (middle + error) * inverse;
+        }
+    }
+
+    /// Goes on from the last slit that the candidate has passed until it has no whole interval left, or no slits are left.
+    #[inline]
+    pub(crate) fn pass(&self, candidate: &mut Candidate) -> Option<Block> {
+        let half = 0.5 * candidate.add;
+        let first = candidate.passed as usize;
+        let (lows, highs) = (&self.lows[first..self.count], &self.highs[first..self.count]);
+        let from = f64::from(candidate.passed);
+        let mut rises = NUMBERS.map(|number| half * (number + from));
+        let mut at = *candidate;
+        let mut done = 0;
+        for (lows, highs) in lows.as_chunks::<LANES>().0.iter().zip(highs.as_chunks::<LANES>().0) {
+            let (low, high) = ends(&at, lows, highs, &rises);
+            if !has_integer(low, high) {
+                break;
+            }
+            at.reach(low, high, first + done);
+            rises = rises.map(|rise| rise + LANES as f64 * half);
+            done += LANES;
+        }
+        let mut rise = rises[0];
+        let mut block = None;
+        for (&low, &high) in lows[done..].iter().zip(&highs[done..]) {
+            let (low, high) = (larger(low - rise, at.low), smaller(high - rise, at.high));
+            if !has_integer(low, high) {
+                block = Some(if low - at.low > at.high - high { Block::Above } else { Block::Below });
+                break;
+            }
+            at.reach(low, high, first + done);
+            rise += half;
+            done += 1;
+        }
+        at.passed = (first + done) as u32;
+        *candidate = at;
+        block
+    }
+
+    /// Which `add` a candidate that is blocked would have to have, at least or at most.
+    #[inline]
+    pub(crate) fn bound(&self, candidate: &Candidate, block: Block) -> f64 {
+        let half = 0.5 * candidate.add;
+        let at = candidate.passed as usize;
+        let (ends, end, own, from) = match block {
+            Block::Above => (&self.highs, candidate.high, self.lows[at], candidate.high_at),
+            Block::Below => (&self.lows, candidate.low, self.highs[at], candidate.low_at),
+        };
+        // The slit that it disagrees with is one of a chunk.
+        let mut rise = half * f64::from(from);
+        let mut index = from as usize;
+        for &value in &ends[from as usize..at - 1] {
+            if value - rise == end {
+                break;
+            }
+            rise += half;
+            index += 1;
+        }
+        2.0 * (own - ends[index]) / f64::from((at - index) as i32)
+    }
+
+    /// The nearest `add` to the slope between the middles of two slits.
+    #[inline]
+    pub(crate) fn add(&self, from: usize, to: usize) -> f64 {
+        let middle = |index: usize| self.lows[index] + self.highs[index];
+        floor((middle(to) - middle(from)) / f64::from((to - from) as i32) + 0.5) as f64
+    }
+}
+
+/// The interval's range after some more slits.
 #[inline]
-fn off(index: usize, time: f64, interval: f64, half_add: f64, base: f64) -> f64 {
-    let before = f64::from(index as i32);
-    ((before + 1.0) * (interval + half_add * before) + base - time).abs()
-}
-
-/// Whether any of the numbers whose bits these are together was negative.
-fn has_sign(bits: u64) -> bool {
-    bits >> 63 != 0
-}
-
-/// What the gaps between steps are held against.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Gaps {
-    pub(crate) shortest: f64,
-    pub(crate) longest: f64,
-    /// The shortest there has been.
-    pub(crate) record: f64,
+fn ends(at: &Candidate, lows: &Lanes, highs: &Lanes, rises: &Lanes) -> (f64, f64) {
+    let lows = map2(*lows, *rises, |low, rise| low - rise);
+    let highs = map2(*highs, *rises, |high, rise| high - rise);
+    (larger(reduce(lows, larger), at.low), smaller(reduce(highs, smaller), at.high))
 }
 
 /// Appends what each step but the first and the last of `times` may be off: at most `max_error`, and `share` of the gap to
-/// either neighbour. Returns whether all gaps between them are within the limits, and whether there is one below the record.
-pub(crate) fn append_errors(
-    times: &[f64],
-    max_error: f64,
-    share: f64,
-    limits: &Gaps,
-    errors: &mut Vec<f64>,
-) -> (bool, bool) {
-    let &[first, second, ..] = times else { return (true, false) };
-    let Gaps { shortest, longest, record } = *limits;
-    let beyond = |gap: f64| (gap - shortest).to_bits() | (longest - gap).to_bits();
-    let (mut outside, mut lower) = (beyond(second - first), (second - first - record).to_bits());
-    let (before, now, after) = (&times[..times.len() - 2], &times[1..times.len() - 1], &times[2..]);
+/// either neighbour. Returns the shortest gap. There are at least two times.
+pub(crate) fn append_errors(times: &[f64], max_error: f64, share: f64, errors: &mut Vec<f64>) -> f64 {
+    let gap = times[1] - times[0];
     let known = errors.len();
-    errors.resize(known + after.len(), 0.0);
-    let known = &mut errors[known..];
-    for (((error, &before), &now), &after) in known.iter_mut().zip(before).zip(now).zip(after) {
-        let gap = after - now;
-        outside |= beyond(gap);
-        lower |= (gap - record).to_bits();
-        *error = smaller(share * smaller(now - before, gap), max_error);
+    errors.resize(known + times.len() - 2, 0.0);
+    let (errors, late_errors) = errors[known..].as_chunks_mut::<LANES>();
+    let late = LANES * errors.len();
+    let (before, now, after) = (times.as_chunks().0, times[1..].as_chunks().0, times[2..].as_chunks().0);
+    let mut shortest = [gap; LANES];
+    for (((errors, before), now), after) in errors.iter_mut().zip(before).zip(now).zip(after) {
+        let before = map2(*now, *before, |now, before| now - before);
+        let after = map2(*after, *now, |after, now| after - now);
+        let nearer = map2(before, after, smaller);
+        *errors = map(nearer, |gap| smaller(share * gap, max_error));
+        shortest = map2(nearer, shortest, smaller);
     }
-    (!has_sign(outside), has_sign(lower))
+    let mut shortest = reduce(shortest, smaller);
+    for (error, &[before, now, after]) in late_errors.iter_mut().zip(times[late..].array_windows()) {
+        let nearer = smaller(now - before, after - now);
+        *error = smaller(share * nearer, max_error);
+        shortest = smaller(nearer, shortest);
+    }
+    shortest
 }
 
-/// The shortest gap between successive times.
-pub(crate) fn shortest_gap(times: &[f64]) -> f64 {
-    times.array_windows().map(|[before, after]| after - before).fold(f64::INFINITY, smaller)
+/// The longest gap between successive times.
+pub(crate) fn longest_gap(times: &[f64]) -> f64 {
+    times.array_windows().map(|[before, after]| after - before).fold(0.0, larger)
 }
 
 /// Appends `f(0)`, `f(1)`, … `f(count − 1)`.
@@ -172,55 +231,67 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// What a candidate has left after the slits of these steps, one by one.
+    fn passed_one_by_one(steps: &Steps<'_>, add: f64) -> (Candidate, Option<Block>) {
+        let mut at = Candidate::new(add);
+        for (index, (time, error)) in steps.times.iter().zip(steps.errors).enumerate() {
+            let (inverse, rise) = (1.0 / (index + 1) as f64, 0.5 * add * index as f64);
+            let own_low = (time - steps.base - error) * inverse - rise;
+            let own_high = (time - steps.base + error) * inverse - rise;
+            let (low, high) = (own_low.max(at.low), own_high.min(at.high));
+            if high - low < 1.0 && low.ceil() > high {
+                let is_above = low - at.low > at.high - high;
+                return (at, Some(if is_above { Block::Above } else { Block::Below }));
+            }
+            at = Candidate { low, high, passed: at.passed + 1, ..at };
+        }
+        (at, None)
+    }
+
     proptest! {
         #[test]
         fn in_lanes_it_is_what_it_is_one_by_one(
-            steps in proptest::collection::vec((1.0..500.0_f64, 0.0..100.0_f64), 0..40),
+            steps in proptest::collection::vec((1.0..500.0_f64, 0.0..100.0_f64), 2..60),
+            (share, whole) in (0.0..1.0_f64, any::<bool>()),
             (add, interval) in (-20..20_i32, 1..500_i32),
         ) {
             let mut clock = 1e9;
-            let times: Vec<f64> = steps.iter().map(|step| { clock += step.0; clock }).collect();
+            let even = if whole { 0.01 } else { 1.0 };
+            let times: Vec<f64> = steps.iter().map(|step| { clock += 200.0 + even * step.0; clock }).collect();
             let errors: Vec<f64> = steps.iter().map(|step| step.1).collect();
             let steps = Steps { base: 1e9, times: &times, errors: &errors };
             let (add, interval) = (f64::from(add), f64::from(interval));
-            let (mut low, mut high, mut worst) = (1.0_f64, f64::INFINITY, 0.0_f64);
-            let mut is_within = true;
-            for (index, (time, error)) in times.iter().zip(&errors).enumerate() {
-                let k = (index + 1) as f64;
-                let bounds = steps.bounds(k, *time, *error, add);
-                (low, high) = (low.max(bounds.0), high.min(bounds.1));
-                worst = worst.max((k * interval + add * k * (k - 1.0) / 2.0 - (time - 1e9)).abs());
-                let off = (k * interval + add * k * (k - 1.0) / 2.0 - (time - 1e9)).abs();
-                is_within &= off <= *error;
-                let within = (interval - bounds.0).min(bounds.1 - interval) * k;
-                prop_assert!((within - (error - off)).abs() < 1e-6);
+            let (by_hand, block) = passed_one_by_one(&steps, if whole { 0.0 } else { add });
+            let mut slits = Slits::default();
+            let mut found = Candidate::new(if whole { 0.0 } else { add });
+            // It does not matter how many are known at a time.
+            slits.fill(&steps, (share * times.len() as f64) as usize);
+            let mut found_block = slits.pass(&mut found);
+            if found_block.is_none() {
+                slits.fill(&steps, times.len());
+                found_block = slits.pass(&mut found);
             }
-            prop_assert_eq!(steps.intervals(add), (low, high));
-            let found = steps.worst(interval, add);
-            prop_assert!((found - worst).abs() < 1e-6, "{} {}", found, worst);
-            prop_assert_eq!(steps.check(interval, add, found), (is_within, false));
-            prop_assert_eq!(steps.check(interval, add, 0.9 * found), (is_within, found > 0.0));
-            let (count, range) = steps.prefix(add);
-            prop_assert_eq!(steps.first(count).intervals(add), range);
-            prop_assert!(count == times.len() || !has_integer_in(steps.first(count + 1).intervals(add)));
-            let mut made = Vec::new();
-            let limits = Gaps { shortest: 2.0, longest: 450.0, record: 20.0 };
-            let found = append_errors(&times, 80.0, 0.25, &limits, &mut made);
-            let by_hand: Vec<f64> =
-                times.windows(3).map(|t| 80.0_f64.min(0.25 * (t[1] - t[0]).min(t[2] - t[1]))).collect();
+            prop_assert_eq!(found_block, block);
+            prop_assert_eq!((found.low, found.high, found.passed), (by_hand.low, by_hand.high, by_hand.passed));
+            let (mut worst, mut clock) = (0.0_f64, 1e9);
+            for (index, time) in times.iter().enumerate() {
+                clock += interval + add * index as f64;
+                worst = worst.max((clock - time).abs());
+            }
+            prop_assert!((steps.worst(interval, add) - worst).abs() < 1e-6);
+            let mut made = vec![7.0];
+            let shortest = append_errors(&times, 80.0, 0.25, &mut made);
+            let by_hand: Vec<f64> = [7.0].into_iter()
+                .chain(times.windows(3).map(|t| 80.0_f64.min(0.25 * (t[1] - t[0]).min(t[2] - t[1]))))
+                .collect();
             prop_assert_eq!(made, by_hand);
-            let all: Vec<f64> = times.windows(2).map(|t| t[1] - t[0]).collect();
-            let shortest = all.iter().copied().fold(f64::INFINITY, f64::min);
-            prop_assert_eq!(found, (all.iter().all(|gap| (2.0..=450.0).contains(gap)), shortest < 20.0));
-            prop_assert_eq!(shortest_gap(&times), shortest);
+            let gaps: Vec<f64> = times.windows(2).map(|t| t[1] - t[0]).collect();
+            prop_assert_eq!(shortest, gaps.iter().copied().fold(f64::INFINITY, f64::min));
+            prop_assert_eq!(longest_gap(&times), gaps.iter().copied().fold(0.0, f64::max));
             let mut squares = vec![7.0];
             append_each(times.len() as u32, |index| index * index, &mut squares);
             let by_hand: Vec<f64> = [7.0].into_iter().chain((0..times.len()).map(|i| (i * i) as f64)).collect();
             prop_assert_eq!(squares, by_hand);
         }
-    }
-
-    fn has_integer_in((low, high): (f64, f64)) -> bool {
-        has_integer(low, high)
     }
 }

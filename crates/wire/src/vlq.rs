@@ -55,17 +55,23 @@ impl Sink for alloc::vec::Vec<u8> {
 /// Appends `value`; `false` when the sink is full.
 pub fn encode(value: i32, sink: &mut impl Sink) -> bool {
     // A value fits n bytes when it lies in -2^(7n-2) ..= 3*2^(7n-2) - 1: the top quarter of the last septet is negative.
-    let fits = |bits: u32| {
-        let quarter = 1_i64 << (bits - 2);
-        (-quarter..3 * quarter).contains(&i64::from(value))
+    let fits = |quarter: i32| (value.wrapping_add(quarter) as u32) < 4 * quarter as u32;
+    let mut shift = if fits(1 << 5) {
+        0
+    } else if fits(1 << 12) {
+        7
+    } else if fits(1 << 19) {
+        14
+    } else if fits(1 << 26) {
+        21
+    } else {
+        28
     };
-    for (bits, shift) in [(35, 28), (28, 21), (21, 14), (14, 7)] {
-        if bits == 35 && fits(28) || bits < 35 && fits(bits - 7) {
-            continue;
-        }
-        if !sink.put(((value >> shift) & 0x7f) as u8 | 0x80) {
+    while shift > 0 {
+        if !sink.put((value >> shift) as u8 | 0x80) {
             return false;
         }
+        shift -= 7;
     }
     sink.put((value & 0x7f) as u8)
 }

@@ -297,51 +297,51 @@ impl Planner {
             if let Some(command) = self.generator.pop() {
                 return Ok(Planned::Steps(command));
             }
-            if let Some(planned) = self.look_ahead.pop() {
-                self.take_planned(planned)?;
-                continue;
+            let Some(item) = self.go_on(source)? else { continue };
+            return Ok(item);
+        }
+    }
+
+    /// What comes before there can be more steps, or the next item. Out of the way of steps, which most items are.
+    #[inline(never)]
+    fn go_on(&mut self, source: &mut Source) -> Result<Option<Planned>, PrinterError> {
+        if let Some(planned) = self.look_ahead.pop() {
+            return self.take_planned(planned).map(|()| None);
+        }
+        match self.run {
+            Run::Ending => {
+                self.generator.end_run().map_err(|error| self.unsteppable(error, None))?;
+                self.trace_paths();
+                self.run = Run::Draining;
+                return Ok(None);
             }
-            match self.run {
-                Run::Ending => {
-                    self.generator.end_run().map_err(|error| self.unsteppable(error, None))?;
-                    self.trace_paths();
-                    self.run = Run::Draining;
-                    continue;
-                }
-                Run::Draining => {
-                    self.run = Run::None;
-                    let still = self.planned_until + self.generator.tail();
-                    self.planned_until = self.look_ahead.print_time().max(still);
-                    return Ok(Planned::RunEnded(self.planned_until));
-                }
-                Run::Active | Run::None => {}
+            Run::Draining => {
+                let still = self.planned_until + self.generator.tail();
+                (self.planned_until, self.run) = (self.look_ahead.print_time().max(still), Run::None);
+                return Ok(Some(Planned::RunEnded(self.planned_until)));
             }
-            if let Some((line, barrier)) = self.barrier.take() {
-                if self.run == Run::None {
-                    return Ok(Planned::Barrier { line, barrier });
-                }
-                self.barrier = Some((line, barrier));
-                self.finish_run();
-                continue;
+            Run::Active | Run::None => {}
+        }
+        if let Some((line, barrier)) = self.barrier.take() {
+            if self.run == Run::None {
+                return Ok(Some(Planned::Barrier { line, barrier }));
             }
-            if let Some(piece) = source.next_piece() {
-                self.push_piece(&piece, source)?;
-                continue;
-            }
-            if let Some(piece) = source.next_arc_piece() {
-                self.judge_and_push(&piece.chord, Some(&arcs::bend(&piece)), source)?;
-                continue;
-            }
+            self.barrier = Some((line, barrier));
+            self.finish_run();
+        } else if let Some(piece) = source.next_piece() {
+            self.push_piece(&piece, source)?;
+        } else if let Some(piece) = source.next_arc_piece() {
+            self.judge_and_push(&piece.chord, Some(&arcs::bend(&piece)), source)?;
+        } else {
             match source.next() {
                 source::Next::Action(action) => self.act(action, source)?,
-                source::Next::Diagnostic(diagnostic) => return Ok(Planned::Notice(diagnostic)),
-                source::Next::NeedsInput => return Ok(Planned::NeedsInput),
-                source::Next::End if self.run == Run::None => return Ok(Planned::EndOfSource),
-                source::Next::End => {
-                    self.finish_run();
-                }
+                source::Next::Diagnostic(diagnostic) => return Ok(Some(Planned::Notice(diagnostic))),
+                source::Next::NeedsInput => return Ok(Some(Planned::NeedsInput)),
+                source::Next::End if self.run == Run::None => return Ok(Some(Planned::EndOfSource)),
+                source::Next::End => drop(self.finish_run()),
             }
         }
+        Ok(None)
     }
 
     fn push(
