@@ -297,6 +297,11 @@ impl Surface {
         self.cells[row.min(rows - 1) * columns + column.min(columns - 1)]
     }
 
+    /// The height of each point, in rows of Y.
+    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.heights.chunks(self.axes[0].count)
+    }
+
     /// The same, lower by so much.
     #[must_use]
     pub fn lowered(mut self, by: f64) -> Self {
