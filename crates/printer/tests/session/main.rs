@@ -11,6 +11,7 @@ mod filters;
 mod heaters;
 mod hold;
 mod homing;
+mod kept;
 mod level;
 mod link;
 mod machine;
