@@ -158,7 +158,7 @@ async function goneOnWith(journal: string): Promise<{ first: PrintLog; second: P
   first.append('5 6');
   await expect.poll(() => store.openFile(first.id).then((copy) => copy.text(), String)).toBe('G28\n');
   await interrupted(first);
-  const start = { confirmedLines: [], line: 3 };
+  const start = { confirmedLines: [], line: 3, transform: null };
   const second = await begun({ ...ABOUT, start, continues: first.id });
   second.append(journal);
   return { first, second };
