@@ -123,7 +123,8 @@ test('from a layer of the preview: up, across, down, and every step of the plan 
   // The board is not homed, and nothing has moved so far.
   expect(pulses(printer)).toEqual([0, 0, 0, 0]);
   const layer = 31;
-  await panel.preview.getByRole('slider').fill(String(layer - 1));
+  const top = panel.preview.getByRole('slider', { name: 'Top layer shown' });
+  for (let shown = 40; shown > layer; shown -= 1) await top.press('ArrowDown');
   await panel.preview.getByRole('button', { name: 'Print from this layer…' }).click();
   const asking = dialog(panel.page, 'Print from a line');
   await expect(asking.getByRole('textbox', { name: /^Line/ })).toHaveValue(String(part.lineOf(layer)));
