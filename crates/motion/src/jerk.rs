@@ -11,7 +11,7 @@
 //! The next window uses as little of it as it can.
 
 use crate::PlannedMove;
-use crate::knots::{Knot, Stretch, Window, time_at};
+use crate::knots::{Knot, Stretch, Window};
 use crate::planned::Phase;
 use std::collections::VecDeque;
 
@@ -139,7 +139,7 @@ fn cut(moves: &[PlannedMove], phases: &[Phase], mut print_time: f64, out: &mut V
         let mut pieces: Vec<Phase> = Vec::new();
         while let Some(phase) = phases.get(next) {
             let is_within = is_last || phase.end_distance <= end;
-            let until = if is_within { phase.duration } else { time_at(phase, end).max(used) };
+            let until = if is_within { phase.duration } else { phase.time_at(end).max(used) };
             if until - used > PIECE_S_MIN {
                 pieces.push(Phase {
                     duration: until - used,

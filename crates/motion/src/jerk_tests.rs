@@ -256,7 +256,7 @@ fn moves_that_wait_are_bounded_also_with_the_least_jerk() {
 }
 
 fn any_parts() -> impl Strategy<Value = Vec<Part>> {
-    let logarithmic = |low: f64, high: f64| (low.ln()..high.ln()).prop_map(libm::exp);
+    let logarithmic = |low: f64, high: f64| (libm::log(low)..libm::log(high)).prop_map(libm::exp);
     let turn = prop_oneof![2 => Just(0.0), 3 => -0.08..0.08_f64, 1 => -3.0..3.0_f64];
     let count = prop_oneof![3 => 1..6_usize, 2 => 6..100_usize, 2 => 100..1200_usize];
     let part = (count, logarithmic(0.02, 2.0), turn, logarithmic(5.0, 400.0), logarithmic(50.0, 20_000.0));

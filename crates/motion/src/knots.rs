@@ -21,10 +21,6 @@ const GAP_MAX: f64 = 1e-8;
 const NEAR: f64 = 0.99;
 /// Attempts to slow down at once before more of the settled knots are kept.
 const BRAKINGS: u32 = 4;
-/// Steps in the search for the time at which a place is passed …
-const ITERATIONS: u32 = 60;
-/// … and how near they get, s.
-const TIME_ERROR_S: f64 = 1e-13;
 
 /// A junction of the window whose speed is settled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +72,16 @@ struct Mark {
     is_stubborn: bool,
     /// The stretch from here that holds: its other end and both speeds.
     proved: Option<(usize, f64, f64)>,
+}
+
+/// What is known of a stretch.
+enum Proof {
+    /// It can be driven.
+    Holds,
+    /// This junction of it is passed too fast.
+    Knot(usize),
+    /// One end cannot be met from the other.
+    Fails,
 }
 
 impl<'a> Window<'a> {
@@ -285,25 +291,21 @@ impl<'a> Window<'a> {
                 return false;
             }
             let mut is_settled = true;
-            for stretch in self.stretches(false) {
-                let Stretch { first, last } = stretch;
-                let key = Some((last, self.speed(first), self.speed(last)));
-                if self.marks[first].proved == key {
-                    continue;
-                }
-                let mut phases = std::mem::take(&mut self.phases);
-                self.phases(stretch, &mut phases);
-                let found = self.lowest_passed_too_fast(stretch, &phases);
-                let reached = phases.last().map_or(0.0, |phase| phase.end_distance);
-                self.phases = phases;
-                let length = self.length(stretch);
-                if let Some(junction) = found {
-                    self.marks[junction].wish = Some(self.limit(junction));
-                    is_settled = false;
-                } else if (reached - length).abs() <= GAP_MAX * length.max(1.0) {
-                    self.marks[first].proved = key;
-                } else {
-                    return false;
+            let mut open = self.stretches(true);
+            while let Some(stretch) = open.pop() {
+                match self.prove(stretch) {
+                    Proof::Holds => {}
+                    // Between knots that were made in this round: the next one lowers or moves them.
+                    Proof::Fails if !is_settled => {}
+                    Proof::Fails => return false,
+                    Proof::Knot(junction) => {
+                        let limit = Some(self.limit(junction));
+                        let mark = &mut self.marks[junction];
+                        (mark.speed, mark.wish) = (limit, limit);
+                        open.push(Stretch { first: junction, ..stretch });
+                        open.push(Stretch { last: junction, ..stretch });
+                        is_settled = false;
+                    }
                 }
             }
             if is_settled {
@@ -311,6 +313,33 @@ impl<'a> Window<'a> {
             }
         }
         false
+    }
+
+    /// Looks whether a stretch can be driven as it is.
+    fn prove(&mut self, stretch: Stretch) -> Proof {
+        let Stretch { first, last } = stretch;
+        let (start, end) = (self.speed(first), self.speed(last));
+        let key = Some((last, start, end));
+        if self.marks[first].proved == key {
+            return Proof::Holds;
+        }
+        if !(self.is_in_reach(first, last, end) && self.is_in_reach(last, first, start)) {
+            return Proof::Fails;
+        }
+        let mut phases = std::mem::take(&mut self.phases);
+        self.phases(stretch, &mut phases);
+        let found = self.lowest_passed_too_fast(stretch, &phases);
+        let reached = phases.last().map_or(0.0, |phase| phase.end_distance);
+        self.phases = phases;
+        let length = self.length(stretch);
+        if let Some(junction) = found {
+            return Proof::Knot(junction);
+        }
+        if (reached - length).abs() > GAP_MAX * length.max(1.0) {
+            return Proof::Fails;
+        }
+        self.marks[first].proved = key;
+        Proof::Holds
     }
 
     /// Lowers knots to what the next one can be met from, and to what the one before leads to; one that would be lowered
@@ -446,7 +475,7 @@ impl<'a> Window<'a> {
                 phases.next();
             }
             let Some(phase) = phases.peek() else { break };
-            let speed = phase.velocity_at(time_at(phase, distance));
+            let speed = phase.velocity_at(phase.time_at(distance));
             let limit = self.limit(junction);
             if speed > limit * (1.0 + SLACK) + SLACK && lowest.is_none_or(|before| limit < self.limit(before))
             {
@@ -455,25 +484,4 @@ impl<'a> Window<'a> {
         }
         lowest
     }
-}
-
-/// When a phase gets to a distance: it never goes back. Newton's steps where they stay inside, halving where not.
-pub(crate) fn time_at(phase: &Phase, distance: f64) -> f64 {
-    let (mut low, mut high) = (0.0, phase.duration);
-    let mut time = 0.5 * phase.duration;
-    for _ in 0..ITERATIONS {
-        let ahead = phase.distance_at(time) - distance;
-        if ahead < 0.0 {
-            low = time;
-        } else {
-            high = time;
-        }
-        let step = time - ahead / phase.velocity_at(time);
-        let next = if step > low && step < high { step } else { 0.5 * (low + high) };
-        if (next - time).abs() <= TIME_ERROR_S {
-            return next;
-        }
-        time = next;
-    }
-    time
 }
