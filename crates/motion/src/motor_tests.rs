@@ -1,7 +1,7 @@
 //! Motors whose strength depends on speed: what is asked of them, and how near to the best that comes.
 
 use crate::motor::{Demand, Torque};
-use crate::{ExtruderLimits, Limits, LookAhead, MotorAbility, MoveRequest, PlannedMove};
+use crate::{Bend, Bound, ExtruderLimits, Limits, LookAhead, MotorAbility, MoveRequest, Phase, PlannedMove};
 use core::f64::consts::TAU;
 use proptest::prelude::*;
 use units::{Mm, MmPerS, MmPerS2};
@@ -59,30 +59,110 @@ fn table(torque: &Torque, rate: f64) -> f64 {
     t0 + (t1 - t0) * (rate - f0) / (f1 - f0)
 }
 
-/// What the motors of the axes x and y are asked for at every moment: never more than the margin leaves.
-fn check_torque(torque: &Torque, planned: &PlannedMove) {
+/// What the motor of an axis is asked for over what the margin leaves, at a speed and an acceleration of its axis.
+fn asked(torque: &Torque, speed: f64, accel: f64) -> f64 {
     let steps_mm = f64::from(torque.full_steps) / torque.turn.0;
     let step_rad = TAU / f64::from(torque.full_steps);
+    // Friction helps to slow down, until the axis stands: a zero has the sign of its direction.
+    let asked = torque.inertia * accel * steps_mm * step_rad + torque.load.copysign(speed);
+    asked.abs() / (torque.margin * table(torque, speed.abs() * steps_mm))
+}
+
+/// The most that the motors of the axes x and y are asked for at any moment, over what the margin leaves.
+fn most_asked(torque: &Torque, planned: &PlannedMove) -> f64 {
+    let mut most: f64 = 0.0;
     for phase in planned.phases() {
         for part in 0..=8 {
             let time = phase.duration * f64::from(part) / 8.0;
+            let (speed, share) = (phase.velocity_at(time).max(0.0), phase.distance_at(time) / planned.length);
             for axis in 0..2 {
-                let speed = phase.velocity_at(time) * planned.direction[axis].abs();
-                let accel = phase.accel * planned.direction[axis].abs();
-                let rate = speed * steps_mm;
-                // Friction helps to slow down.
-                let asked = torque.inertia * accel * steps_mm * step_rad + torque.load;
-                let has = torque.margin * table(torque, rate);
-                let is_moving = planned.direction[axis] != 0.0;
-                assert!(
-                    !is_moving || phase.accel <= 0.0 || asked <= has * (1.0 + 1e-9),
-                    "{asked} of {has} at {rate}"
-                );
-                assert!(
-                    !is_moving || phase.accel >= 0.0 || -asked <= has * (1.0 + 1e-9),
-                    "{asked} of {has} at {rate}"
-                );
+                let slope = |share| {
+                    planned.bend.as_ref().map_or(planned.direction[axis], |bend| bend.slope(axis, share))
+                };
+                let bend = (slope(share + 1e-3) - slope(share - 1e-3)) / (2e-3 * planned.length);
+                let accel = phase.accel * slope(share) + speed * speed * bend;
+                most = most.max(asked(torque, speed * slope(share), accel));
             }
+        }
+    }
+    most
+}
+
+/// The same where moves meet, on a curve of many of them: its direction changes from the middle of each to that of the next.
+fn most_asked_between(torque: &Torque, planned: &[PlannedMove]) -> f64 {
+    let mut most: f64 = 0.0;
+    for pair in planned.windows(2) {
+        let speed = pair[0].end_velocity;
+        let ends = [pair[0].phases().last().unwrap(), pair[1].phases().next().unwrap()];
+        for axis in 0..2 {
+            let bend = (pair[1].direction[axis] - pair[0].direction[axis])
+                / (0.5 * (pair[0].length + pair[1].length));
+            for (planned, phase) in pair.iter().zip(&ends) {
+                let slope = planned.direction[axis];
+                most = most.max(asked(torque, speed * slope, phase.accel * slope + speed * speed * bend));
+            }
+        }
+    }
+    most
+}
+
+/// What the motors of the axes x and y are asked for at every moment: never more than the margin leaves.
+fn check_torque(torque: &Torque, planned: &PlannedMove) {
+    let most = most_asked(torque, planned);
+    assert!(most <= 1.0 + 1e-9, "{most} {planned:?}");
+}
+
+/// Plans a circle of so many pieces, each an arc or its chord, from the angle 0.
+fn plan_circle(torque: &Torque, radius: f64, turns: f64, pieces: u32, is_arc: bool) -> Vec<PlannedMove> {
+    let mut look_ahead = LookAhead::with_motors(limits(), motors(torque)).unwrap();
+    let turn = TAU * turns / f64::from(pieces);
+    let point = |angle: f64| [radius * libm::cos(angle), radius * libm::sin(angle), 0.0, 0.0];
+    for index in 0..pieces {
+        let start_angle = turn * f64::from(index);
+        let bend = Bend {
+            normal: 2,
+            centre: [0.0; 2],
+            start_angle,
+            turn,
+            radii: [radius; 2],
+            rise: 0.0,
+            continues: index > 0,
+            arc_length: radius * TAU * turns,
+        };
+        let [from, to] = [start_angle, turn * f64::from(index + 1)].map(point);
+        let request = MoveRequest { from, to, feed: MmPerS(2000.0), tag: index };
+        look_ahead.push_along(&request, Some(&bend).filter(|_| is_arc)).unwrap();
+    }
+    look_ahead.flush();
+    std::iter::from_fn(|| look_ahead.pop()).collect()
+}
+
+#[test]
+fn an_arc_asks_no_motor_for_more_than_it_has_while_it_turns_and_speeds_up() {
+    for radius in [1.0, 5.0, 20.0, 100.0, 400.0] {
+        let planned = plan_circle(&torque(), radius, 2.0, 600, true);
+        let most = planned.iter().map(|one| most_asked(&torque(), one)).fold(0.0, f64::max);
+        assert!((0.8..=1.0 + 1e-6).contains(&most), "{most} at {radius}");
+    }
+}
+
+#[test]
+fn a_circle_of_chords_asks_no_motor_for_more_than_it_has() {
+    for radius in [1.0, 5.0, 20.0, 100.0, 400.0] {
+        let planned = plan_circle(&torque(), radius, 2.0, 1000, false);
+        for one in &planned {
+            check_torque(&torque(), one);
+        }
+        let most = most_asked_between(&torque(), &planned);
+        assert!((0.8..=1.0 + 1e-6).contains(&most), "{most} at {radius}");
+        // Over many pieces at once, too.
+        let far = |axis: usize, [a, b]: [&PlannedMove; 2]| {
+            let [start, end] = [a, b].map(|one| one.start_velocity * one.direction[axis]);
+            asked(&torque(), 0.5 * (start + end), (end - start) / (b.start_time - a.start_time))
+        };
+        for pair in planned.windows(9) {
+            let most = (0..2).map(|axis| far(axis, [&pair[0], &pair[8]])).fold(0.0, f64::max);
+            assert!(most <= 1.02, "{most} at {radius}");
         }
     }
 }
@@ -181,6 +261,103 @@ fn nothing_cruises_in_a_band_of_resonance() {
     assert!((above[0].cruise_velocity - 100.0).abs() < 1e-9);
 }
 
+/// The limits of a usual printer.
+fn usual() -> Limits {
+    Limits {
+        max_velocity: MmPerS(300.0),
+        max_accel: MmPerS2(3000.0),
+        minimum_cruise_ratio: 0.5,
+        max_z_velocity: MmPerS(15.0),
+        max_z_accel: MmPerS2(200.0),
+        ..limits()
+    }
+}
+
+/// How long a move goes along evenly at a speed at which x or y lies in one of these bands (mm/s), s.
+fn shakes(planned: &PlannedMove, bands: &[(f64, f64)]) -> f64 {
+    let lies_within = |speed: f64| {
+        let shares = [0, 1].map(|axis| planned.direction[axis].abs() * speed);
+        shares.iter().any(|at| bands.iter().any(|&(low, high)| low + 1e-9 < *at && *at < high - 1e-9))
+    };
+    let is_even = |phase: &Phase| phase.accel == 0.0 && lies_within(phase.velocity);
+    planned.phases().filter(is_even).map(|phase| phase.duration).sum()
+}
+
+#[test]
+fn what_is_calm_for_one_motor_is_not_a_band_of_another() {
+    let torque = Torque { resonances: vec![(20.0, 40.0)], ..torque() };
+    // 12 mm/s are 7.2 of y, whose band begins at 6.7 of the path. There x goes 5.3, and its band begins at 5 of the path.
+    let both = plan(&torque, &[([80.0, 60.0, 0.0, 0.0], 12.0)], limits());
+    assert!((both[0].cruise_velocity * 0.8 - 4.0).abs() < 1e-9, "{}", both[0].cruise_velocity);
+    let mut bound = Bound::new(motors(&torque));
+    let request = MoveRequest { from: [0.0; 4], to: [80.0, 60.0, 0.0, 0.0], feed: MmPerS(12.0), tag: 0 };
+    bound.push(&request, &limits());
+    bound.stop();
+    let ratio = both[0].duration() / bound.total().0;
+    assert!((1.0 - 1e-3..1.005).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn a_short_move_does_not_go_along_in_a_band_of_resonance() {
+    // 400 ..= 600 steps/s are 80 ..= 120 mm/s. The virtual profile's peak is at 95.9.
+    let torque = Torque { resonances: vec![(400.0, 600.0)], ..torque() };
+    let short = plan(&torque, &[([6.0, 0.0, 0.0, 0.0], 300.0)], usual());
+    assert!((short[0].cruise_velocity - 80.0).abs() < 1e-9, "{}", short[0].cruise_velocity);
+    assert!(short[0].gap_mm() < 1e-9);
+    // Of many pieces as of one.
+    let pieces: Vec<_> = (1..=60).map(|piece| ([0.1 * f64::from(piece), 0.0, 0.0, 0.0], 300.0)).collect();
+    let planned = plan(&torque, &pieces, usual());
+    let time: f64 = planned.iter().map(PlannedMove::duration).sum();
+    assert!((time - short[0].duration()).abs() < 1e-9, "{time}");
+    // Without a ratio the peak is none to stay at.
+    let sharp = Limits { minimum_cruise_ratio: 0.0, ..usual() };
+    let peak = plan(&torque, &[([4.0, 0.0, 0.0, 0.0], 300.0)], sharp);
+    assert!((108.0..112.0).contains(&peak[0].cruise_velocity), "{}", peak[0].cruise_velocity);
+}
+
+#[test]
+fn a_move_that_starts_in_a_band_of_resonance_crosses_it() {
+    // Y shakes at 10 ..= 25 mm/s. The way turns into that at a corner, and the virtual profile's peak is at 20 of it.
+    let band = (10.0, 25.0);
+    let motor = Torque { resonances: vec![(50.0, 125.0)], ..torque() }.ability().unwrap();
+    let limits = Limits { square_corner_velocity: MmPerS(500.0), ..usual() };
+    let mut look_ahead = LookAhead::with_motors(limits, vec![None, Some(motor), None, None]).unwrap();
+    let [start, corner, end] = [[0.0; 4], [100.0, 0.0, 0.0, 0.0], [100.0 + 0.6 * 0.31, 0.8 * 0.31, 0.0, 0.0]];
+    look_ahead.push(&MoveRequest { from: start, to: corner, feed: MmPerS(90.0), tag: 0 }).unwrap();
+    look_ahead.push(&MoveRequest { from: corner, to: end, feed: MmPerS(300.0), tag: 1 }).unwrap();
+    look_ahead.flush();
+    let second = std::iter::from_fn(|| look_ahead.pop()).last().unwrap();
+    assert!((band.0..band.1).contains(&(0.8 * second.start_velocity)), "{}", second.start_velocity);
+    assert!(0.8 * second.cruise_velocity > band.1, "{}", second.cruise_velocity);
+    assert!(shakes(&second, &[band]) < 1e-9 && second.gap_mm() < 1e-9);
+}
+
+#[test]
+fn the_first_move_takes_its_time_where_the_way_turns_back_at_once() {
+    let start = torque().ability().unwrap().start().0;
+    for way in [0.001, 0.01, 0.05, 0.08, 0.5] {
+        let points = [way, 0.0].map(|x| ([x, 0.0, 0.0, 0.0], 100.0));
+        let planned = plan(&torque(), &points, usual());
+        assert!(planned.iter().all(|one| one.gap_mm() < 1e-9 && one.duration() > 0.0), "{way}");
+        let mean = way / planned[0].duration();
+        // It starts as fast as it can stop.
+        assert!(mean >= 0.49 * start.min((2.0 * 3000.0 * way).sqrt()), "{way}: {mean}");
+    }
+    // Nor does a slow run before it hold it up.
+    let mut look_ahead = LookAhead::with_motors(usual(), motors(&torque())).unwrap();
+    let mut go = |[from, to]: [f64; 2], feed: f64| {
+        let [from, to] = [from, to].map(|x| [x, 0.0, 0.0, 0.0]);
+        look_ahead.push(&MoveRequest { from, to, feed: MmPerS(feed), tag: 0 }).unwrap();
+        if to[0] != 1.05 {
+            look_ahead.flush();
+        }
+        std::iter::from_fn(|| look_ahead.pop()).map(|planned| planned.duration()).collect::<Vec<_>>()
+    };
+    assert_eq!(go([0.0, 1.0], 0.1).len(), 1);
+    go([1.0, 1.05], 100.0);
+    assert!(go([1.05, 0.0], 100.0)[0] < 0.02);
+}
+
 #[test]
 fn what_no_motor_has_is_refused() {
     for wrong in [
@@ -245,6 +422,49 @@ proptest! {
                 prop_assert!(jump.abs() <= ability.start().0 * (1.0 + 1e-9), "{} {:?}", jump, ability.start());
             }
             before = Some(one);
+        }
+    }
+
+    #[test]
+    fn no_circle_asks_a_motor_for_more_than_it_has(
+        torque in any_torque(),
+        radius in 0.5..300.0_f64,
+        turns in 0.05..2.0_f64,
+        pieces in 100_u32..800,
+    ) {
+        if torque.ability().is_err() {
+            return Ok(());
+        }
+        for planned in plan_circle(&torque, radius, turns, pieces, true) {
+            let most = most_asked(&torque, &planned);
+            prop_assert!(most <= 1.0 + 1e-6, "{} {:?}", most, planned);
+            prop_assert!(planned.gap_mm() < 1e-9);
+        }
+        let chords = plan_circle(&torque, radius, turns, pieces, false);
+        prop_assert!(chords.iter().all(|one| most_asked(&torque, one) <= 1.0 + 1e-9 && one.gap_mm() < 1e-9));
+        let most = most_asked_between(&torque, &chords);
+        prop_assert!(most <= 1.0 + 1e-6, "{}", most);
+    }
+
+    #[test]
+    fn along_a_line_nothing_ever_stays_in_a_band(
+        bands in proptest::collection::vec((10.0..1500.0_f64, 1.0..400.0_f64), 1..4),
+        steps in proptest::collection::vec((0.01..20.0_f64, 1.0..300.0_f64), 1..60),
+        ratio in prop_oneof![Just(0.0), 0.0..0.95_f64],
+        heading in 0.0..TAU,
+    ) {
+        let resonances: Vec<_> = bands.iter().map(|&(low, width)| (low, low + width)).collect();
+        let bands: Vec<_> = resonances.iter().map(|&(low, high)| (0.2 * low, 0.2 * high)).collect();
+        let torque = Torque { resonances, ..torque() };
+        let mut at = 0.0;
+        let points = steps.iter().map(|&(length, feed)| {
+            at += length;
+            ([at * libm::cos(heading), at * libm::sin(heading), 0.0, 0.0], feed)
+        });
+        let points: Vec<_> = points.collect();
+        for planned in plan(&torque, &points, Limits { minimum_cruise_ratio: ratio, ..usual() }) {
+            prop_assert!(planned.gap_mm() < 1e-9);
+            prop_assert!(shakes(&planned, &bands) < 1e-9, "{:?}", planned);
         }
     }
 
