@@ -150,8 +150,9 @@ impl Bound {
             accel = accel.min(extruder.max_extrude_only_accel.0 / share);
         }
         for (motor, share) in self.driven(&direction) {
-            speed = speed.min(motor.calm(motor.top().0.min(speed * share)) / share);
+            speed = speed.min(motor.top().0 / share);
         }
+        let speed = self.calm(speed, &direction);
         let rest = self.jump(&direction, extruder.instantaneous_corner_velocity.0).min(speed);
         Some(Way {
             headings,
@@ -202,6 +203,17 @@ impl Bound {
     fn driven<'a>(&'a self, direction: &'a [f64; 4]) -> impl Iterator<Item = (&'a MotorAbility, f64)> {
         let pairs = self.motors.iter().zip(direction);
         pairs.filter_map(|(motor, share)| Some((motor.as_ref().filter(|_| *share != 0.0)?, share.abs())))
+    }
+
+    /// The highest speed along the path at which no motor resonates: down through the bands, from that with the highest end.
+    fn calm(&self, speed: f64, direction: &[f64; 4]) -> f64 {
+        let along = |(motor, share): (&MotorAbility, f64)| {
+            motor.bands().iter().map(|band| [band.0 / share, band.1 / share]).collect::<Vec<_>>()
+        };
+        let mut bands: Vec<[f64; 2]> = self.driven(direction).flat_map(along).collect();
+        bands.sort_by(|a, b| b[1].total_cmp(&a[1]));
+        let below = |speed: f64, [low, high]: [f64; 2]| if speed < high { speed.min(low) } else { speed };
+        bands.into_iter().fold(speed, below)
     }
 
     /// The highest squared speed between two moves, by the angle between them.

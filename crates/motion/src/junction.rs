@@ -110,7 +110,7 @@ impl Entry {
             }
             let start = match motor {
                 Some(motor) => {
-                    velocity = velocity.min(motor.calm(motor.top().0.min(velocity * share)) / share);
+                    velocity = velocity.min(motor.top().0 / share);
                     motor.start().0
                 }
                 // A motor of which nothing is known starts from rest.
@@ -119,6 +119,7 @@ impl Entry {
             };
             jump = jump.min(start / share);
         }
+        let velocity = calm(velocity, &shares, motors);
         let jump = jump.min(velocity);
         Some(Self {
             tag: request.tag,
@@ -164,6 +165,13 @@ impl Entry {
     /// The top of the move between two squared speeds, should it not cruise.
     pub(crate) fn peak(&self, start_v2: f64, end_v2: f64, motors: &[Option<MotorAbility>]) -> f64 {
         peak(&self.speeding(motors), &self.slowing(motors), start_v2, end_v2, self.length)
+    }
+
+    /// The highest squared speed up to `v2` at which none of its motors resonates.
+    pub(crate) fn calm(&self, v2: f64, motors: &[Option<MotorAbility>]) -> f64 {
+        let velocity = v2.sqrt();
+        let calm = calm(velocity, &self.shares, motors);
+        if calm < velocity { calm * calm } else { v2 }
     }
 
     /// Sets the start limits of this move, which follows `previous` without a stop.
@@ -239,6 +247,27 @@ impl Entry {
     fn whole_length(&self) -> f64 {
         self.bend.map_or(self.length, |bend| bend.arc_length.max(self.length))
     }
+}
+
+/// The highest speed along the path, up to `velocity`, at which none of the motors resonates.
+fn calm(mut velocity: f64, shares: &Vector4<f64>, motors: &[Option<MotorAbility>]) -> f64 {
+    // What is calm for one motor may lie in a band of another. Each round leaves one band or more for good.
+    let bands: usize = motors.iter().flatten().map(|motor| motor.bands().len()).sum();
+    for _ in 0..bands {
+        let before = velocity;
+        for (motor, share) in motors.iter().zip(shares.iter()) {
+            let (Some(motor), true) = (motor, *share != 0.0) else { continue };
+            let speed = velocity * share.abs();
+            let calm = motor.calm(speed);
+            if calm < speed {
+                velocity = calm / share.abs();
+            }
+        }
+        if velocity >= before {
+            break;
+        }
+    }
+    velocity
 }
 
 /// The highest speed along an arc, up to `top`: turning asks for v² times the curvature, of the path and of each axis.

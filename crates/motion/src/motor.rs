@@ -25,6 +25,8 @@ const STAIRS_MAX: usize = 2048;
 const START_SHARE: f64 = 0.25;
 /// A motor that has less than this share of its best acceleration left counts as being at its top speed.
 const ACCEL_LEFT_MIN: f64 = 0.01;
+/// Rounding: the low end of a band, as another move of the same direction has it.
+const BAND_EDGE: f64 = 1.0 + 1e-9;
 
 /// Whether a move speeds up or slows down: friction helps the one and hinders the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -253,12 +255,17 @@ impl MotorAbility {
         MmPerS(self.start)
     }
 
+    /// The speeds of the axis (mm/s) between which it shakes.
+    pub(crate) fn bands(&self) -> &[(f64, f64)] {
+        &self.resonances
+    }
+
     /// The highest speed up to `speed` at which the axis does not shake: outside of all bands.
     pub(crate) fn calm(&self, speed: f64) -> f64 {
         let mut calm = speed;
         // Each pass leaves one band or more for good.
         for _ in 0..=self.resonances.len() {
-            let band = self.resonances.iter().find(|&&(low, high)| low < calm && calm < high);
+            let band = self.resonances.iter().find(|&&(low, high)| low * BAND_EDGE < calm && calm < high);
             let Some(&(low, _)) = band else { break };
             calm = low;
         }

@@ -1,7 +1,7 @@
 //! Motors whose strength depends on speed: what is asked of them, and how near to the best that comes.
 
 use crate::motor::{Demand, Torque};
-use crate::{ExtruderLimits, Limits, LookAhead, MotorAbility, MoveRequest, PlannedMove};
+use crate::{Bound, ExtruderLimits, Limits, LookAhead, MotorAbility, MoveRequest, Phase, PlannedMove};
 use core::f64::consts::TAU;
 use proptest::prelude::*;
 use units::{Mm, MmPerS, MmPerS2};
@@ -181,6 +181,103 @@ fn nothing_cruises_in_a_band_of_resonance() {
     assert!((above[0].cruise_velocity - 100.0).abs() < 1e-9);
 }
 
+/// The limits of a usual printer.
+fn usual() -> Limits {
+    Limits {
+        max_velocity: MmPerS(300.0),
+        max_accel: MmPerS2(3000.0),
+        minimum_cruise_ratio: 0.5,
+        max_z_velocity: MmPerS(15.0),
+        max_z_accel: MmPerS2(200.0),
+        ..limits()
+    }
+}
+
+/// How long a move goes along evenly at a speed at which x or y lies in one of these bands (mm/s), s.
+fn shakes(planned: &PlannedMove, bands: &[(f64, f64)]) -> f64 {
+    let lies_within = |speed: f64| {
+        let shares = [0, 1].map(|axis| planned.direction[axis].abs() * speed);
+        shares.iter().any(|at| bands.iter().any(|&(low, high)| low + 1e-9 < *at && *at < high - 1e-9))
+    };
+    let is_even = |phase: &Phase| phase.accel == 0.0 && lies_within(phase.velocity);
+    planned.phases().filter(is_even).map(|phase| phase.duration).sum()
+}
+
+#[test]
+fn what_is_calm_for_one_motor_is_not_a_band_of_another() {
+    let torque = Torque { resonances: vec![(20.0, 40.0)], ..torque() };
+    // 12 mm/s are 7.2 of y, whose band begins at 6.7 of the path. There x goes 5.3, and its band begins at 5 of the path.
+    let both = plan(&torque, &[([80.0, 60.0, 0.0, 0.0], 12.0)], limits());
+    assert!((both[0].cruise_velocity * 0.8 - 4.0).abs() < 1e-9, "{}", both[0].cruise_velocity);
+    let mut bound = Bound::new(motors(&torque));
+    let request = MoveRequest { from: [0.0; 4], to: [80.0, 60.0, 0.0, 0.0], feed: MmPerS(12.0), tag: 0 };
+    bound.push(&request, &limits());
+    bound.stop();
+    let ratio = both[0].duration() / bound.total().0;
+    assert!((1.0 - 1e-3..1.005).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn a_short_move_does_not_go_along_in_a_band_of_resonance() {
+    // 400 ..= 600 steps/s are 80 ..= 120 mm/s. The virtual profile's peak is at 95.9.
+    let torque = Torque { resonances: vec![(400.0, 600.0)], ..torque() };
+    let short = plan(&torque, &[([6.0, 0.0, 0.0, 0.0], 300.0)], usual());
+    assert!((short[0].cruise_velocity - 80.0).abs() < 1e-9, "{}", short[0].cruise_velocity);
+    assert!(short[0].gap_mm() < 1e-9);
+    // Of many pieces as of one.
+    let pieces: Vec<_> = (1..=60).map(|piece| ([0.1 * f64::from(piece), 0.0, 0.0, 0.0], 300.0)).collect();
+    let planned = plan(&torque, &pieces, usual());
+    let time: f64 = planned.iter().map(PlannedMove::duration).sum();
+    assert!((time - short[0].duration()).abs() < 1e-9, "{time}");
+    // Without a ratio the peak is none to stay at.
+    let sharp = Limits { minimum_cruise_ratio: 0.0, ..usual() };
+    let peak = plan(&torque, &[([4.0, 0.0, 0.0, 0.0], 300.0)], sharp);
+    assert!((108.0..112.0).contains(&peak[0].cruise_velocity), "{}", peak[0].cruise_velocity);
+}
+
+#[test]
+fn a_move_that_starts_in_a_band_of_resonance_crosses_it() {
+    // Y shakes at 10 ..= 25 mm/s. The way turns into that at a corner, and the virtual profile's peak is at 20 of it.
+    let band = (10.0, 25.0);
+    let motor = Torque { resonances: vec![(50.0, 125.0)], ..torque() }.ability().unwrap();
+    let limits = Limits { square_corner_velocity: MmPerS(500.0), ..usual() };
+    let mut look_ahead = LookAhead::with_motors(limits, vec![None, Some(motor), None, None]).unwrap();
+    let [start, corner, end] = [[0.0; 4], [100.0, 0.0, 0.0, 0.0], [100.0 + 0.6 * 0.31, 0.8 * 0.31, 0.0, 0.0]];
+    look_ahead.push(&MoveRequest { from: start, to: corner, feed: MmPerS(90.0), tag: 0 }).unwrap();
+    look_ahead.push(&MoveRequest { from: corner, to: end, feed: MmPerS(300.0), tag: 1 }).unwrap();
+    look_ahead.flush();
+    let second = std::iter::from_fn(|| look_ahead.pop()).last().unwrap();
+    assert!((band.0..band.1).contains(&(0.8 * second.start_velocity)), "{}", second.start_velocity);
+    assert!(0.8 * second.cruise_velocity > band.1, "{}", second.cruise_velocity);
+    assert!(shakes(&second, &[band]) < 1e-9 && second.gap_mm() < 1e-9);
+}
+
+#[test]
+fn the_first_move_takes_its_time_where_the_way_turns_back_at_once() {
+    let start = torque().ability().unwrap().start().0;
+    for way in [0.001, 0.01, 0.05, 0.08, 0.5] {
+        let points = [way, 0.0].map(|x| ([x, 0.0, 0.0, 0.0], 100.0));
+        let planned = plan(&torque(), &points, usual());
+        assert!(planned.iter().all(|one| one.gap_mm() < 1e-9 && one.duration() > 0.0), "{way}");
+        let mean = way / planned[0].duration();
+        // It starts as fast as it can stop.
+        assert!(mean >= 0.49 * start.min((2.0 * 3000.0 * way).sqrt()), "{way}: {mean}");
+    }
+    // Nor does a slow run before it hold it up.
+    let mut look_ahead = LookAhead::with_motors(usual(), motors(&torque())).unwrap();
+    let mut go = |[from, to]: [f64; 2], feed: f64| {
+        let [from, to] = [from, to].map(|x| [x, 0.0, 0.0, 0.0]);
+        look_ahead.push(&MoveRequest { from, to, feed: MmPerS(feed), tag: 0 }).unwrap();
+        if to[0] != 1.05 {
+            look_ahead.flush();
+        }
+        std::iter::from_fn(|| look_ahead.pop()).map(|planned| planned.duration()).collect::<Vec<_>>()
+    };
+    assert_eq!(go([0.0, 1.0], 0.1).len(), 1);
+    go([1.0, 1.05], 100.0);
+    assert!(go([1.05, 0.0], 100.0)[0] < 0.02);
+}
+
 #[test]
 fn what_no_motor_has_is_refused() {
     for wrong in [
@@ -245,6 +342,28 @@ proptest! {
                 prop_assert!(jump.abs() <= ability.start().0 * (1.0 + 1e-9), "{} {:?}", jump, ability.start());
             }
             before = Some(one);
+        }
+    }
+
+    #[test]
+    fn along_a_line_nothing_ever_stays_in_a_band(
+        bands in proptest::collection::vec((10.0..1500.0_f64, 1.0..400.0_f64), 1..4),
+        steps in proptest::collection::vec((0.01..20.0_f64, 1.0..300.0_f64), 1..60),
+        ratio in prop_oneof![Just(0.0), 0.0..0.95_f64],
+        heading in 0.0..TAU,
+    ) {
+        let resonances: Vec<_> = bands.iter().map(|&(low, width)| (low, low + width)).collect();
+        let bands: Vec<_> = resonances.iter().map(|&(low, high)| (0.2 * low, 0.2 * high)).collect();
+        let torque = Torque { resonances, ..torque() };
+        let mut at = 0.0;
+        let points = steps.iter().map(|&(length, feed)| {
+            at += length;
+            ([at * libm::cos(heading), at * libm::sin(heading), 0.0, 0.0], feed)
+        });
+        let points: Vec<_> = points.collect();
+        for planned in plan(&torque, &points, Limits { minimum_cruise_ratio: ratio, ..usual() }) {
+            prop_assert!(planned.gap_mm() < 1e-9);
+            prop_assert!(shakes(&planned, &bands) < 1e-9, "{:?}", planned);
         }
     }
 

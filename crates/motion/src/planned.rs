@@ -139,10 +139,11 @@ impl PlannedMove {
         ]
     }
 
-    /// The largest gap between where a phase leads to and where it says that it ends, in mm: rounding.
+    /// The largest gap between where a phase leads to and where it says that it ends, in mm: rounding. All of the way where
+    /// there is no phase.
     pub(crate) fn gap_mm(&self) -> f64 {
         let gap = |phase: Phase| (phase.distance_at(phase.duration) - phase.end_distance).abs();
-        self.phases().map(gap).fold(0.0, f64::max)
+        self.phases().map(gap).reduce(f64::max).unwrap_or(self.length)
     }
 
     /// Path driven `time` seconds after the start of the move, in mm; its ends outside the move.

@@ -22,6 +22,8 @@ struct Node {
     start_v2: f64,
     /// The squared top speed, or `None` where the virtual profile only slows down: then the move may not speed up.
     ceiling_v2: Option<f64>,
+    /// Whether some motor has bands of resonance and the real profile goes along at that ceiling, instead of turning below.
+    is_flat: bool,
     /// Whether nothing pushed later can change this move.
     is_final: bool,
 }
@@ -111,6 +113,8 @@ impl Window {
         // The peak of the virtual profile behind the move in hand, and whether it (or its absence) is final.
         let mut ceiling: Option<f64> = None;
         let mut ceiling_is_final = false;
+        let shakes = self.motors.iter().flatten().any(|motor| !motor.bands().is_empty());
+        let mut is_flat = shakes;
         for entry in self.entries.iter().rev() {
             let motors = &self.motors;
             let reach = entry.slowing(motors).reach(next.v2, entry.length);
@@ -130,20 +134,37 @@ impl Window {
                         next.smoothed_is_final && here.smoothed_is_final && (has_peak || ceiling_is_final);
                     let (start, end) = (here.smoothed_v2, next.smoothed_v2);
                     let top = peak(&smoothed, &smoothed_slowing, start, end, entry.length);
-                    ceiling = Some(entry.cruise_limit.min(top));
+                    let top = entry.cruise_limit.min(top);
+                    ceiling = Some(top);
+                    is_flat = shakes && top < entry.peak(here.v2, next.v2, motors);
                 }
             } else {
                 ceiling = None;
+                is_flat = shakes;
                 ceiling_is_final = next.smoothed_is_final;
             }
             self.nodes.push(Node {
                 start_v2: here.v2,
                 ceiling_v2: ceiling,
+                is_flat,
                 is_final: next.is_final && next.smoothed_is_final && ceiling_is_final,
             });
             next = here;
         }
         self.nodes.reverse();
+    }
+
+    /// The squared top speed of the oldest move. Along a ceiling in a band of resonance the motors would shake: then it is
+    /// the low end of the band, if the move starts no faster.
+    fn ceiling(&self, entry: &Entry, node: &Node) -> f64 {
+        let falling =
+            || self.released_end_v2.map_or(node.start_v2, |_| self.released_ceiling_v2.min(node.start_v2));
+        let ceiling_v2 = node.ceiling_v2.unwrap_or_else(falling);
+        if !node.is_flat {
+            return ceiling_v2;
+        }
+        let calm_v2 = entry.calm(ceiling_v2, &self.motors).max(self.released_end_v2.unwrap_or(0.0));
+        if entry.calm(calm_v2, &self.motors) < calm_v2 { ceiling_v2 } else { calm_v2 }
     }
 
     /// Turns the first `count` nodes into trapezoids.
@@ -152,20 +173,22 @@ impl Window {
             let Some(entry) = self.entries.pop_front() else { break };
             let node = self.nodes[index];
             let next = self.nodes.get(index + 1);
-            let ceiling_v2 = node.ceiling_v2.unwrap_or(self.released_ceiling_v2.min(node.start_v2));
+            let ceiling_v2 = self.ceiling(&entry, &node);
             let start_v2 = self.released_end_v2.unwrap_or(node.start_v2.min(ceiling_v2));
             let motors = &self.motors;
             let end_v2 = next
-                .map_or(entry.jump_v2, |next| {
-                    next.start_v2.min(ceiling_v2).min(next.ceiling_v2.unwrap_or(f64::INFINITY))
-                })
-                .min(entry.speeding(motors).reach(start_v2, entry.length));
-            let cruise_v2 = entry
-                .cruise_limit
-                .min(entry.peak(start_v2, end_v2, motors))
+                .map_or(entry.jump_v2, |next| next.start_v2.min(next.ceiling_v2.unwrap_or(f64::INFINITY)))
                 .min(ceiling_v2)
-                .max(start_v2)
-                .max(end_v2);
+                .min(entry.speeding(motors).reach(start_v2, entry.length));
+            let top_v2 = entry.cruise_limit.min(entry.peak(start_v2, end_v2, motors));
+            let mut cruise_v2 = top_v2.min(ceiling_v2).max(start_v2).max(end_v2);
+            // Too fast for what is calm below: what is calm above is the way out, if there is one.
+            if cruise_v2 < top_v2
+                && entry.calm(cruise_v2, motors) < cruise_v2
+                && entry.calm(top_v2, motors) > cruise_v2
+            {
+                cruise_v2 = top_v2;
+            }
             let planned = PlannedMove::new(&entry, motors, [start_v2, cruise_v2, end_v2], *print_time);
             *print_time = planned.end_time();
             out.push_back(planned);
