@@ -54,14 +54,16 @@ pub(crate) enum WordFault {
 }
 
 /// What ended the words.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct WordsEnd {
-    /// Where a `;` stands.
-    pub(crate) comment: Option<usize>,
-    /// Where a `*` stands.
-    pub(crate) checksum: Option<usize>,
-    /// Where a `(` stands that nothing closes.
-    pub(crate) unclosed: Option<usize>,
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum WordsEnd {
+    /// The line's own end.
+    Line,
+    /// A `;`.
+    Comment,
+    /// A `*`, which stands there.
+    Checksum(usize),
+    /// A `(` that stands there and that nothing closes.
+    Unclosed(usize),
 }
 
 impl Default for Words {
@@ -94,20 +96,22 @@ impl Words {
                     Self::check_exponent(bytes, first, at)?;
                 }
                 at = self.word(bytes, at, index)?;
+                // The usual blank.
+                at += usize::from(bytes.get(at) == Some(&b' '));
                 continue;
             }
             match byte {
                 b' ' | b'\t' | b'\r' => at += 1,
-                b';' => return Ok(WordsEnd { comment: Some(at), ..WordsEnd::default() }),
-                b'*' => return Ok(WordsEnd { checksum: Some(at), ..WordsEnd::default() }),
+                b';' => return Ok(WordsEnd::Comment),
+                b'*' => return Ok(WordsEnd::Checksum(at)),
                 b'(' => match memchr::memchr(b')', &bytes[at..]) {
                     Some(length) => at += length + 1,
-                    None => return Ok(WordsEnd { unclosed: Some(at), ..WordsEnd::default() }),
+                    None => return Ok(WordsEnd::Unclosed(at)),
                 },
                 _ => return Err(Self::no_letter(bytes, at)),
             }
         }
-        Ok(WordsEnd::default())
+        Ok(WordsEnd::Line)
     }
 
     /// Reads the word at `at`, whose letter is that of `index`, and says where it ends.
@@ -222,7 +226,7 @@ mod tests {
             let (words, end) = scan(text).unwrap();
             let values: Vec<_> = b"XYEF".iter().map(|&l| words.get(l).unwrap()).collect();
             assert_eq!(values, [1.5, -2.0, 0.25, 1800.0], "{text}");
-            assert_eq!((words.present(), end), (bits(b"XYEF"), WordsEnd::default()));
+            assert_eq!((words.present(), end), (bits(b"XYEF"), WordsEnd::Line));
         }
     }
 
@@ -230,7 +234,7 @@ mod tests {
     fn letters_without_numbers_are_remembered_as_such() {
         let (words, end) = scan("X Y0;home").unwrap();
         assert_eq!((words.bare(), words.has(b'X'), words.get(b'X')), (bit(b'X'), true, None));
-        assert_eq!((words.get(b'Y'), end.comment), (Some(0.0), Some(4)));
+        assert_eq!((words.get(b'Y'), end), (Some(0.0), WordsEnd::Comment));
     }
 
     #[test]
@@ -243,6 +247,6 @@ mod tests {
         assert_eq!(scan("X1 =2").unwrap_err(), WordFault::NoLetter(3..5));
         assert_eq!(scan("X1 \u{7f}").unwrap_err(), WordFault::NotText(3..4));
         assert_eq!(scan("X1 G91").unwrap_err(), WordFault::SecondCommand(3..4));
-        assert_eq!(scan("X1 (open").unwrap().1.unclosed, Some(3));
+        assert_eq!(scan("X1 (open").unwrap().1, WordsEnd::Unclosed(3));
     }
 }

@@ -6,11 +6,33 @@
 //!
 //! Squared speeds in mm²/s², lengths in mm, accelerations in mm/s², all along the path.
 
-use crate::motor::{Demand, MotorAbility};
+use crate::motor::{Demand, MotorAbility, TURNING_SHARE};
 use nalgebra::Vector4;
 
 /// Takes a stair's end, there and back through a motor's share, to the next stair.
 const JUST_ABOVE: f64 = 1.0 + 4.0 * f64::EPSILON;
+
+/// Stairs of what turning takes, from rest to the speed up to which it is counted.
+const TURNING_STAIRS: f64 = 32.0;
+
+/// What turning takes of each axis: v² times the change of its share per mm of path.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turning {
+    /// The highest squared speed at which the path turns so.
+    pub(crate) until_v2: f64,
+    /// Change of each axis' share per mm, without sign.
+    pub(crate) bends: Vector4<f64>,
+}
+
+impl Turning {
+    /// A path that goes straight on.
+    pub(crate) const NONE: Self = Self { until_v2: 0.0, bends: Vector4::new(0.0, 0.0, 0.0, 0.0) };
+    /// What is not known yet may take all that turning may.
+    pub(crate) const ANY: Self = {
+        let any = f64::INFINITY;
+        Self { until_v2: any, bends: Vector4::new(any, any, any, any) }
+    };
+}
 
 /// A move that speeds up or slows down: the reading of its motors.
 #[derive(Clone, Copy, Debug)]
@@ -21,6 +43,8 @@ pub(crate) struct Ability<'a> {
     direction: &'a Vector4<f64>,
     /// Motors whose strength depends on speed; none where limits are all there is.
     motors: &'a [Option<MotorAbility>],
+    /// Where and how the path turns meanwhile.
+    turnings: &'a [Turning],
     demand: Demand,
 }
 
@@ -36,19 +60,28 @@ impl<'a> Ability<'a> {
         accel: f64,
         direction: &'a Vector4<f64>,
         motors: &'a [Option<MotorAbility>],
+        turnings: &'a [Turning],
         demand: Demand,
     ) -> Self {
-        Self { accel, direction, motors, demand }
+        Self { accel, direction, motors, turnings, demand }
     }
 
     /// What there is just above a squared speed.
     fn stair(&self, v2: f64) -> Stair {
-        let mut stair = Stair { accel: self.accel, until_v2: f64::INFINITY };
-        for (motor, share) in self.motors.iter().zip(self.direction.iter()) {
+        let v2_above = v2 * JUST_ABOVE;
+        let turns_until = self.turnings.iter().map(|turning| turning.until_v2).fold(0.0, f64::max);
+        let cell = turns_until / TURNING_STAIRS;
+        let turning_v2 =
+            if v2_above < turns_until { cell * (libm::floor(v2_above / cell) + 1.0) } else { f64::INFINITY };
+        let mut stair = Stair { accel: self.accel, until_v2: turning_v2 };
+        for (axis, (motor, share)) in self.motors.iter().zip(self.direction.iter()).enumerate() {
             let (Some(motor), true) = (motor, *share != 0.0) else { continue };
             let share2 = share * share;
-            let (accel, until_v2) = motor.at(v2 * share2 * JUST_ABOVE, self.demand);
-            stair.accel = stair.accel.min(accel / share.abs());
+            let (accel, until_v2) = motor.at(v2_above * share2, self.demand);
+            let asked = |turning: &Turning| turning.bends[axis] * turning_v2.min(turning.until_v2);
+            let turning = self.turnings.iter().map(asked).fold(0.0, f64::max);
+            let left = (accel - turning).max(accel * (1.0 - TURNING_SHARE));
+            stair.accel = stair.accel.min(left / share.abs());
             stair.until_v2 = stair.until_v2.min(until_v2 / share2);
         }
         stair

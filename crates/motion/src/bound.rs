@@ -10,7 +10,7 @@
 
 mod curve;
 
-use crate::motor::{Demand, MotorAbility};
+use crate::motor::{Demand, MotorAbility, TURNING_SHARE};
 use crate::{Bend, Limits, MoveRequest};
 use curve::Curve;
 use units::Seconds;
@@ -26,6 +26,9 @@ const CELLS_MAX: u32 = 2_000;
 /// Shorter moves are none.
 const LENGTH_MIN_MM: f64 = 1e-9;
 
+/// What a curve asks of the axes: the change of their shares per mm, at squared speeds up to the last number.
+type Turn = ([f64; 4], f64);
+
 /// A move as the bound sees it.
 #[derive(Clone, Copy, Debug)]
 struct Way {
@@ -39,6 +42,8 @@ struct Way {
     /// It goes on with the arc of the move before.
     continues: bool,
     bends: bool,
+    /// The turns at its start, all along it and at its end.
+    turns: [Turn; 3],
     travels: bool,
     cruise_v2: f64,
     accel: f64,
@@ -78,7 +83,13 @@ impl Bound {
         let from = self.at.unwrap_or(request.from);
         let Some(mut way) = self.way(from, request, bend, limits) else { return };
         self.at = Some(request.to);
-        way.corner_v2 = self.ways.last().map_or(way.rest_v2, |before| self.corner(before, &way));
+        way.corner_v2 = way.rest_v2;
+        if let Some(before) = self.ways.last() {
+            let turn = self.corner(before, &way);
+            way.corner_v2 = turn.1;
+            way.turns[0] = turn;
+            self.ways.last_mut().into_iter().for_each(|before| before.turns[2] = turn);
+        }
         if way.corner_v2 == 0.0 || self.ways.len() >= MOVES_MAX {
             self.solve(0.0);
         }
@@ -161,6 +172,13 @@ impl Bound {
             whole: bend.map_or(length, |bend| bend.arc_length.max(length)),
             continues: bend.is_some_and(|bend| bend.continues),
             bends: curve.is_some(),
+            turns: [
+                Turn::default(),
+                curve.map_or_else(Turn::default, |Curve { bends: [x, y, z], .. }| {
+                    ([x, y, z, 0.0], speed * speed)
+                }),
+                Turn::default(),
+            ],
             travels,
             cruise_v2: speed * speed,
             accel,
@@ -216,10 +234,11 @@ impl Bound {
         bands.into_iter().fold(speed, below)
     }
 
-    /// The highest squared speed between two moves, by the angle between them.
-    fn corner(&self, a: &Way, b: &Way) -> f64 {
+    /// The highest squared speed between two moves, by the angle between them, and how the motors' axes turn there.
+    fn corner(&self, a: &Way, b: &Way) -> Turn {
+        let mut bends = [0.0; 4];
         if !(a.travels && b.travels) {
-            return 0.0;
+            return (bends, 0.0);
         }
         let mut v2 = a.cruise_v2.min(b.cruise_v2);
         let (before, after) = (a.headings[1], b.headings[0]);
@@ -228,7 +247,7 @@ impl Bound {
         let speed = b.extruder_jump / jump(3);
         v2 = v2.min(speed * speed);
         if b.continues && a.bends && b.bends && dot > 0.99 {
-            return v2;
+            return (bends, v2);
         }
         // Half the angle between the two, a right angle where they go straight on.
         let half = 0.5 * (core::f64::consts::PI - libm::acos(dot.clamp(-1.0, 1.0)));
@@ -244,16 +263,26 @@ impl Bound {
             let speed = motor.start().0 / jump(axis);
             v2 = v2.min(speed * speed);
             let share = a.shares[axis].abs().max(b.shares[axis].abs());
-            v2 = motor.bend_limit(v2, 2.0 * jump(axis) / (a.whole + b.whole), share, true);
+            bends[axis] = 2.0 * jump(axis) / (a.whole + b.whole);
+            v2 = motor.bend_limit(v2, bends[axis], share, true);
         }
-        v2
+        (bends, v2)
     }
 
-    /// What a move can speed up or slow down by at a squared speed.
+    /// What a move can speed up or slow down by at a squared speed, beside what turning takes.
     fn accel(&self, way: &Way, v2: f64, demand: Demand) -> f64 {
         let speed = v2.sqrt();
-        self.driven(&way.shares)
-            .fold(way.accel, |accel, (motor, share)| accel.min(motor.exact(speed * share, demand) / share))
+        let demand = if way.bends { Demand::Turn } else { demand };
+        let mut least = way.accel;
+        for (axis, motor) in self.motors.iter().enumerate() {
+            let (Some(motor), true) = (motor, way.shares[axis] != 0.0) else { continue };
+            let share = way.shares[axis].abs();
+            let all = motor.exact(speed * share, demand);
+            let asked = way.turns.map(|(bends, until)| bends[axis] * v2.min(until));
+            let left = all - asked.into_iter().fold(0.0, f64::max).min(TURNING_SHARE * all);
+            least = least.min(left / share);
+        }
+        least
     }
 
     /// The same in the middle of a cell that begins with a squared speed: the midpoint rule.

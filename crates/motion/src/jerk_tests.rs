@@ -20,13 +20,22 @@ fn limits(accel: f64) -> Limits {
 }
 
 fn plan(points: &[([f64; 4], f64)], limits: Limits, jerk: Option<f64>) -> Vec<PlannedMove> {
+    let points: Vec<_> = points.iter().map(|&(to, feed)| (to, feed, limits)).collect();
+    plan_each(&points, jerk, true)
+}
+
+/// The same with limits for each move; taken as they come, or all at the end.
+fn plan_each(points: &[([f64; 4], f64, Limits)], jerk: Option<f64>, at_once: bool) -> Vec<PlannedMove> {
     let profile = Profile { motors: Vec::new(), max_jerk: jerk.map(MmPerS3) };
-    let mut look_ahead = LookAhead::with_profile(limits, profile).unwrap();
+    let mut look_ahead = LookAhead::with_profile(points[0].2, profile).unwrap();
     let mut from = [0.0; 4];
     let mut planned = Vec::new();
-    for (tag, &(to, feed)) in points.iter().enumerate() {
+    for (tag, &(to, feed, limits)) in points.iter().enumerate() {
+        look_ahead.set_limits(limits).unwrap();
         look_ahead.push(&MoveRequest { from, to, feed: MmPerS(feed), tag: tag as u32 }).unwrap();
-        planned.extend(std::iter::from_fn(|| look_ahead.pop()));
+        if at_once {
+            planned.extend(std::iter::from_fn(|| look_ahead.pop()));
+        }
         from = to;
     }
     look_ahead.flush();
@@ -141,6 +150,123 @@ fn a_jerk_without_bounds_costs_nothing() {
     assert!((1.0..1.001).contains(&ratio), "{ratio}");
 }
 
+/// Moves of one kind: how many, their length, the turn between two, feed rate and acceleration.
+type Part = (usize, f64, f64, f64, f64);
+
+fn path(parts: &[Part], minimum_cruise_ratio: f64) -> Vec<([f64; 4], f64, Limits)> {
+    let (mut at, mut heading) = ([0.0; 4], 0.0);
+    let moves = parts.iter().flat_map(|part| std::iter::repeat_n(*part, part.0));
+    moves
+        .map(|(_, length, turn, feed, accel)| {
+            heading += turn;
+            at[0] += length * libm::cos(heading);
+            at[1] += length * libm::sin(heading);
+            (at, feed, Limits { minimum_cruise_ratio, ..limits(accel) })
+        })
+        .collect()
+}
+
+/// Plans and checks a path; gives the moves with a limited jerk.
+fn checked(points: &[([f64; 4], f64, Limits)], jerk: f64) -> Vec<PlannedMove> {
+    let made = plan_each(points, Some(jerk), true);
+    check(&made, &plan_each(points, None, true), jerk);
+    made
+}
+
+#[test]
+fn a_curve_of_short_pieces_can_be_braked_on() {
+    for (jerk, accel, length, radius) in
+        [(1e5, 5000.0, 0.1, 5.0), (2e4, 3000.0, 0.03, 15.0), (5e5, 10_000.0, 0.2, 40.0)]
+    {
+        for slow in [20.0, 60.0] {
+            let turn = length / radius;
+            let points = path(&[(600, length, turn, 250.0, accel), (600, length, turn, slow, accel)], 0.5);
+            let made = checked(&points, jerk);
+            // It does not stop anywhere, and it does not creep.
+            let slowest = made[100..1100].iter().map(|one| one.end_velocity).fold(f64::INFINITY, f64::min);
+            assert!(slowest > 0.9 * slow, "{slowest} of {slow}, jerk {jerk}");
+            let cruise = plan_each(&points, None, true).last().unwrap().end_time();
+            let time = made.last().unwrap().end_time();
+            assert!(time < 1.1 * cruise + 4.0 * accel / jerk, "{time} {cruise}");
+        }
+    }
+}
+
+#[test]
+fn a_short_move_of_less_acceleration_is_met() {
+    let moves = [
+        (1, 310.0, 0.0, 100.0, 3000.0),
+        (1, 5.0, 0.0, 100.0, 3000.0),
+        (1, 0.5, 0.0, 100.0, 500.0),
+        (1, 1.0, 0.0, 100.0, 3000.0),
+    ];
+    checked(&path(&moves, 0.0), 1e5);
+    for length in [0.1, 0.5, 1.0, 3.0] {
+        for accel in [18.0, 200.0, 500.0] {
+            for before in [1.0, 2.0, 5.0, 10.0] {
+                let parts = [
+                    (1, 250.0, 0.0, 80.0, 3000.0),
+                    (1, before, 0.0, 80.0, 3000.0),
+                    (1, length, 0.0, 80.0, accel),
+                    (1, 10.0, 0.0, 80.0, 3000.0),
+                ];
+                checked(&path(&parts, 0.0), 1e5);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_window_of_few_long_moves_keeps_what_the_last_one_relied_on() {
+    let limits = |accel| Limits {
+        max_velocity: MmPerS(400.0),
+        square_corner_velocity: MmPerS(18.67),
+        ..limits(accel)
+    };
+    let mut at = [0.0; 4];
+    let mut points = Vec::new();
+    let deltas = [(374.72, -149.57), (107.998, -41.644), (649.95, -256.977), (147.27, -58.458)];
+    for (index, (x, y)) in deltas.into_iter().enumerate() {
+        (at[0], at[1]) = (at[0] + x, at[1] + y);
+        points.push((at, 326.74, limits(if index == 0 { 2826.85 } else { 58.5486 })));
+    }
+    checked(&points, 137.56);
+    for jerk in [100.0, 1e3, 1e4] {
+        for last in [5.0, 20.0, 100.0] {
+            let parts =
+                [(2, 300.0, 0.0, 300.0, 500.0), (1, last, 0.0, 300.0, 500.0), (2, 310.0, 0.0, 60.0, 500.0)];
+            checked(&path(&parts, 0.0), jerk);
+        }
+    }
+}
+
+#[test]
+fn moves_that_wait_are_bounded_also_with_the_least_jerk() {
+    let profile = Profile { motors: Vec::new(), max_jerk: Some(MmPerS3(100.0)) };
+    let mut look_ahead = LookAhead::with_profile(limits(3000.0), profile).unwrap();
+    let points = path(&[(4000, 0.1, 0.001, 300.0, 3000.0)], 0.0);
+    let mut from = [0.0; 4];
+    for &(to, feed, _) in &points {
+        look_ahead.push(&MoveRequest { from, to, feed: MmPerS(feed), tag: 0 }).unwrap();
+        while look_ahead.pop().is_some() {}
+        assert!(look_ahead.len() < 2 * crate::jerk::WINDOW_MOVES + 1100, "{}", look_ahead.len());
+        from = to;
+    }
+    checked(&points, 100.0);
+}
+
+fn any_parts() -> impl Strategy<Value = Vec<Part>> {
+    let logarithmic = |low: f64, high: f64| (libm::log(low)..libm::log(high)).prop_map(libm::exp);
+    let turn = prop_oneof![2 => Just(0.0), 3 => -0.08..0.08_f64, 1 => -3.0..3.0_f64];
+    let count = prop_oneof![3 => 1..6_usize, 2 => 6..100_usize, 2 => 100..1200_usize];
+    let part = (count, logarithmic(0.02, 2.0), turn, logarithmic(5.0, 400.0), logarithmic(50.0, 20_000.0));
+    // Single moves may be long.
+    let part = (part, logarithmic(1.0, 200.0)).prop_map(|((count, length, turn, feed, accel), stretch)| {
+        (count, if count < 6 { length * stretch } else { length }, turn, feed, accel)
+    });
+    proptest::collection::vec(part, 1..12)
+}
+
 fn any_points() -> impl Strategy<Value = Vec<([f64; 4], f64)>> {
     let step = (0.0..core::f64::consts::TAU, 0.01..1.0_f64, 0.0..1.0_f64, 5.0..300.0_f64);
     proptest::collection::vec(step, 1..1500).prop_map(|steps| {
@@ -177,5 +303,19 @@ proptest! {
     ) {
         let limits = limits(accel);
         check(&plan(&points, limits, Some(jerk)), &plan(&points, limits, None), jerk);
+    }
+
+    #[test]
+    fn changes_of_feed_rate_acceleration_and_curves_keep_every_limit(
+        parts in any_parts(),
+        ratio in prop_oneof![Just(0.0), Just(0.5)],
+        jerk in (2.0..7.0_f64).prop_map(|power| libm::pow(10.0, power)),
+    ) {
+        let points = path(&parts, ratio);
+        let made = checked(&points, jerk);
+        // Whoever takes them, and when, changes nothing. (All of them do not wait for that.)
+        if points.len() < 4000 {
+            prop_assert_eq!(made, plan_each(&points, Some(jerk), false));
+        }
     }
 }

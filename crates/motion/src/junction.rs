@@ -1,6 +1,6 @@
 //! One move under its limits, and the speed at which two moves may meet.
 
-use crate::ability::{Ability, peak};
+use crate::ability::{Ability, Turning, peak};
 use crate::motor::{Demand, MotorAbility};
 use crate::{Bend, Limits, MoveRequest};
 use nalgebra::{Vector3, Vector4};
@@ -31,6 +31,8 @@ pub(crate) struct Entry {
     travels: bool,
     junction_deviation: f64,
     corner_extruder: f64,
+    /// How its path turns: at its start, on its way and at its end, of which nothing is known before the next move comes.
+    turnings: [Turning; 3],
     /// The highest cruising speed, squared.
     pub(crate) cruise_limit: f64,
     /// How long it would take at its highest cruising speed, s: it never takes less.
@@ -133,6 +135,14 @@ impl Entry {
             travels,
             junction_deviation: limits.junction_deviation_mm(),
             corner_extruder,
+            turnings: [
+                Turning::NONE,
+                bend.map_or(Turning::NONE, |bend| Turning {
+                    until_v2: velocity * velocity,
+                    bends: bend.curvatures().push(0.0),
+                }),
+                Turning::ANY,
+            ],
             cruise_limit: velocity * velocity,
             nominal_time: length / velocity,
             smoothed_accel: accel.min(limits.smoothed_accel_mm_s2()),
@@ -142,24 +152,35 @@ impl Entry {
         })
     }
 
+    const fn ability<'a>(
+        &'a self,
+        accel: f64,
+        motors: &'a [Option<MotorAbility>],
+        demand: Demand,
+    ) -> Ability<'a> {
+        // Along an arc an axis may do either, at any speed up to that of its share.
+        let demand = if self.bend.is_some() { Demand::Turn } else { demand };
+        Ability::new(accel, &self.shares, motors, &self.turnings, demand)
+    }
+
     /// What the move can speed up by.
     pub(crate) const fn speeding<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
-        Ability::new(self.accel, &self.shares, motors, Demand::Speed)
+        self.ability(self.accel, motors, Demand::Speed)
     }
 
     /// What it can slow down by.
     pub(crate) const fn slowing<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
-        Ability::new(self.accel, &self.shares, motors, Demand::Slow)
+        self.ability(self.accel, motors, Demand::Slow)
     }
 
     /// The gentler speeding up of the virtual look-ahead.
     pub(crate) const fn smoothed_speeding<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
-        Ability::new(self.smoothed_accel, &self.shares, motors, Demand::Speed)
+        self.ability(self.smoothed_accel, motors, Demand::Speed)
     }
 
     /// The same for slowing down.
     pub(crate) const fn smoothed_slowing<'a>(&'a self, motors: &'a [Option<MotorAbility>]) -> Ability<'a> {
-        Ability::new(self.smoothed_accel, &self.shares, motors, Demand::Slow)
+        self.ability(self.smoothed_accel, motors, Demand::Slow)
     }
 
     /// The top of the move between two squared speeds, should it not cruise.
@@ -174,9 +195,19 @@ impl Entry {
         if calm < velocity { calm * calm } else { v2 }
     }
 
-    /// Sets the start limits of this move, which follows `previous` without a stop.
-    pub(crate) fn follow(&mut self, previous: &Self, motors: &[Option<MotorAbility>]) {
-        self.start_limit = self.junction_limit(previous, motors);
+    /// Nothing follows this move without a stop.
+    pub(crate) const fn end(&mut self) {
+        self.turnings[2] = Turning::NONE;
+    }
+
+    /// Sets the start limits of this move, which follows `previous` without a stop, and what both can do beside the turn.
+    pub(crate) fn follow(&mut self, previous: &mut Self, motors: &[Option<MotorAbility>]) {
+        let mut bends = Vector4::zeros();
+        self.start_limit = self.junction_limit(previous, motors, &mut bends);
+        let turning = Turning { until_v2: self.start_limit, bends };
+        let turning = if bends == Vector4::zeros() { Turning::NONE } else { turning };
+        self.turnings[0] = turning;
+        previous.turnings[2] = turning;
         self.smoothed_start_limit = self.start_limit;
         self.keep_in_reach(previous, motors);
     }
@@ -190,8 +221,14 @@ impl Entry {
         self.smoothed_start_limit = self.start_limit.min(self.smoothed_start_limit).min(smoothed);
     }
 
-    /// The highest squared speed at which this move may follow `previous`, whatever their lengths allow.
-    fn junction_limit(&self, previous: &Self, motors: &[Option<MotorAbility>]) -> f64 {
+    /// The highest squared speed at which this move may follow `previous`, whatever their lengths allow. `bends` becomes the
+    /// change of each motor's share per mm about there.
+    fn junction_limit(
+        &self,
+        previous: &Self,
+        motors: &[Option<MotorAbility>],
+        bends: &mut Vector4<f64>,
+    ) -> f64 {
         if !(self.travels && previous.travels) {
             return 0.0;
         }
@@ -233,6 +270,7 @@ impl Entry {
                 let bend = jump / (0.5 * (self.whole_length() + previous.whole_length()));
                 let share = self.shares[axis].abs().max(previous.shares[axis].abs());
                 limit = motor.bend_limit(limit, bend, share, false);
+                bends[axis] = bend;
             }
         }
         limit

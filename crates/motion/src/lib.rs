@@ -16,6 +16,7 @@ mod bend;
 mod bound;
 mod jerk;
 mod junction;
+mod knots;
 mod limits;
 mod look_ahead;
 mod motor;

@@ -23,6 +23,8 @@ const STAIRS_MAX: usize = 2048;
 /// The share of the rate at which a motor starts without a ramp that it is asked for: the rotor swings about the jump, and the
 /// ramp that follows needs torque of its own.
 const START_SHARE: f64 = 0.25;
+/// The most of a motor's acceleration that turning takes: the rest, or more, is left for speeding up and slowing down meanwhile.
+pub(crate) const TURNING_SHARE: f64 = 0.5;
 /// A motor that has less than this share of its best acceleration left counts as being at its top speed.
 const ACCEL_LEFT_MIN: f64 = 0.01;
 /// Rounding: the low end of a band, as another move of the same direction has it.
@@ -35,6 +37,8 @@ pub enum Demand {
     Speed,
     /// Slowing down.
     Slow,
+    /// Either, at any speed up to the one asked for: on a curve an axis slows down while another speeds up.
+    Turn,
 }
 
 /// A motor with what it drives.
@@ -91,6 +95,7 @@ pub struct MotorAbility {
     torque: Torque,
     speeding: Vec<Stair>,
     slowing: Vec<Stair>,
+    turning: Vec<Stair>,
     top: f64,
     start: f64,
     resonances: Vec<(f64, f64)>,
@@ -110,6 +115,7 @@ impl Torque {
         }
         Ok(MotorAbility {
             torque: self.clone(),
+            turning: least(&speeding, &slowing),
             speeding,
             slowing,
             top: self.mm_per_step() * top_rate,
@@ -229,6 +235,35 @@ impl Torque {
     }
 }
 
+/// The least of two staircases up to each speed: falling stairs.
+fn least(a: &[Stair], b: &[Stair]) -> Vec<Stair> {
+    let mut ends: Vec<f64> = a.iter().chain(b).map(|stair| stair.until_v2).collect();
+    ends.sort_by(f64::total_cmp);
+    let mut least = f64::INFINITY;
+    let mut start = 0.0;
+    let mut stairs: Vec<Stair> = Vec::new();
+    for until_v2 in ends {
+        let accel = at(a, start).0.min(at(b, start).0);
+        start = until_v2;
+        match stairs.last_mut() {
+            Some(last) if accel >= least => last.until_v2 = until_v2,
+            _ => stairs.push(Stair { until_v2, accel }),
+        }
+        least = least.min(accel);
+    }
+    stairs
+}
+
+/// The acceleration just above a squared speed, and the squared speed up to which it is there.
+#[inline]
+fn at(stairs: &[Stair], v2: f64) -> (f64, f64) {
+    let index = stairs.partition_point(|stair| stair.until_v2 <= v2);
+    match stairs.get(index) {
+        Some(stair) => (stair.accel, stair.until_v2),
+        None => (stairs.last().map_or(0.0, |last| last.accel), f64::INFINITY),
+    }
+}
+
 fn interpolate(table: &[(f64, f64)], rate: f64) -> f64 {
     for pair in table.windows(2) {
         let [(f0, t0), (f1, t1)] = [pair[0], pair[1]];
@@ -273,19 +308,16 @@ impl MotorAbility {
     }
 
     /// The highest squared speed along the path, up to `limit_v2`, at which the motor can follow a path that bends by `bend`
-    /// (change of its share per mm): that takes v²·bend of acceleration, at the speed v·`share`.
+    /// (change of its share per mm) with its share for that: it takes v²·bend of acceleration, at the speed v·`share`.
     pub(crate) fn bend_limit(&self, limit_v2: f64, bend: f64, share: f64, exact: bool) -> f64 {
         let ability = |v2: f64| {
-            let of = |demand: Demand| {
-                if exact {
-                    self.exact(v2.sqrt() * share, demand)
-                } else {
-                    self.at(v2 * share * share, demand).0
-                }
-            };
-            of(Demand::Speed).min(of(Demand::Slow))
+            if exact {
+                self.exact(v2.sqrt() * share, Demand::Turn)
+            } else {
+                self.at(v2 * share * share, Demand::Turn).0
+            }
         };
-        crate::s_curve::highest(0.0, limit_v2, |v2| v2 * bend <= ability(v2))
+        crate::s_curve::highest(0.0, limit_v2, |v2| v2 * bend <= TURNING_SHARE * ability(v2))
     }
 
     /// The acceleration (mm/s²) just above a squared speed, and the squared speed up to which it is there.
@@ -294,23 +326,27 @@ impl MotorAbility {
         let stairs = match demand {
             Demand::Speed => &self.speeding,
             Demand::Slow => &self.slowing,
+            Demand::Turn => &self.turning,
         };
-        let index = stairs.partition_point(|stair| stair.until_v2 <= v2);
-        match stairs.get(index) {
-            Some(stair) => (stair.accel, stair.until_v2),
-            None => (stairs.last().map_or(0.0, |last| last.accel), f64::INFINITY),
-        }
+        at(stairs, v2)
     }
 
     /// What the table itself leaves at a speed, without its staircase; nothing counts as the least that is not nothing.
     pub(crate) fn exact(&self, speed: f64, demand: Demand) -> f64 {
         let torque = &self.torque;
         let rate = speed / torque.mm_per_step();
-        let (table, sign) = match demand {
-            Demand::Speed => (&torque.pull_out, -1.0),
-            Demand::Slow => (torque.pull_out_slowing.as_ref().unwrap_or(&torque.pull_out), 1.0),
+        let slowing = torque.pull_out_slowing.as_ref().unwrap_or(&torque.pull_out);
+        let left = |torque_here: f64, sign: f64| torque.margin * torque_here + sign * torque.load;
+        let least = |table: &[(f64, f64)]| {
+            let before = table.iter().filter(|point| point.0 < rate).map(|point| point.1);
+            before.fold(interpolate(table, rate), f64::min)
         };
-        torque.accel(torque.margin * interpolate(table, rate) + sign * torque.load).max(f64::MIN_POSITIVE)
+        let left = match demand {
+            Demand::Speed => left(interpolate(&torque.pull_out, rate), -1.0),
+            Demand::Slow => left(interpolate(slowing, rate), 1.0),
+            Demand::Turn => left(least(&torque.pull_out), -1.0).min(left(least(slowing), 1.0)),
+        };
+        torque.accel(left).max(f64::MIN_POSITIVE)
     }
 
     /// The same in speeds: acceleration of the axis at a speed.

@@ -1,7 +1,7 @@
 //! Motors whose strength depends on speed: what is asked of them, and how near to the best that comes.
 
 use crate::motor::{Demand, Torque};
-use crate::{Bound, ExtruderLimits, Limits, LookAhead, MotorAbility, MoveRequest, Phase, PlannedMove};
+use crate::{Bend, Bound, ExtruderLimits, Limits, LookAhead, MotorAbility, MoveRequest, Phase, PlannedMove};
 use core::f64::consts::TAU;
 use proptest::prelude::*;
 use units::{Mm, MmPerS, MmPerS2};
@@ -59,30 +59,110 @@ fn table(torque: &Torque, rate: f64) -> f64 {
     t0 + (t1 - t0) * (rate - f0) / (f1 - f0)
 }
 
-/// What the motors of the axes x and y are asked for at every moment: never more than the margin leaves.
-fn check_torque(torque: &Torque, planned: &PlannedMove) {
+/// What the motor of an axis is asked for over what the margin leaves, at a speed and an acceleration of its axis.
+fn asked(torque: &Torque, speed: f64, accel: f64) -> f64 {
     let steps_mm = f64::from(torque.full_steps) / torque.turn.0;
     let step_rad = TAU / f64::from(torque.full_steps);
+    // Friction helps to slow down, until the axis stands: a zero has the sign of its direction.
+    let asked = torque.inertia * accel * steps_mm * step_rad + torque.load.copysign(speed);
+    asked.abs() / (torque.margin * table(torque, speed.abs() * steps_mm))
+}
+
+/// The most that the motors of the axes x and y are asked for at any moment, over what the margin leaves.
+fn most_asked(torque: &Torque, planned: &PlannedMove) -> f64 {
+    let mut most: f64 = 0.0;
     for phase in planned.phases() {
         for part in 0..=8 {
             let time = phase.duration * f64::from(part) / 8.0;
+            let (speed, share) = (phase.velocity_at(time).max(0.0), phase.distance_at(time) / planned.length);
             for axis in 0..2 {
-                let speed = phase.velocity_at(time) * planned.direction[axis].abs();
-                let accel = phase.accel * planned.direction[axis].abs();
-                let rate = speed * steps_mm;
-                // Friction helps to slow down.
-                let asked = torque.inertia * accel * steps_mm * step_rad + torque.load;
-                let has = torque.margin * table(torque, rate);
-                let is_moving = planned.direction[axis] != 0.0;
-                assert!(
-                    !is_moving || phase.accel <= 0.0 || asked <= has * (1.0 + 1e-9),
-                    "{asked} of {has} at {rate}"
-                );
-                assert!(
-                    !is_moving || phase.accel >= 0.0 || -asked <= has * (1.0 + 1e-9),
-                    "{asked} of {has} at {rate}"
-                );
+                let slope = |share| {
+                    planned.bend.as_ref().map_or(planned.direction[axis], |bend| bend.slope(axis, share))
+                };
+                let bend = (slope(share + 1e-3) - slope(share - 1e-3)) / (2e-3 * planned.length);
+                let accel = phase.accel * slope(share) + speed * speed * bend;
+                most = most.max(asked(torque, speed * slope(share), accel));
             }
+        }
+    }
+    most
+}
+
+/// The same where moves meet, on a curve of many of them: its direction changes from the middle of each to that of the next.
+fn most_asked_between(torque: &Torque, planned: &[PlannedMove]) -> f64 {
+    let mut most: f64 = 0.0;
+    for pair in planned.windows(2) {
+        let speed = pair[0].end_velocity;
+        let ends = [pair[0].phases().last().unwrap(), pair[1].phases().next().unwrap()];
+        for axis in 0..2 {
+            let bend = (pair[1].direction[axis] - pair[0].direction[axis])
+                / (0.5 * (pair[0].length + pair[1].length));
+            for (planned, phase) in pair.iter().zip(&ends) {
+                let slope = planned.direction[axis];
+                most = most.max(asked(torque, speed * slope, phase.accel * slope + speed * speed * bend));
+            }
+        }
+    }
+    most
+}
+
+/// What the motors of the axes x and y are asked for at every moment: never more than the margin leaves.
+fn check_torque(torque: &Torque, planned: &PlannedMove) {
+    let most = most_asked(torque, planned);
+    assert!(most <= 1.0 + 1e-9, "{most} {planned:?}");
+}
+
+/// Plans a circle of so many pieces, each an arc or its chord, from the angle 0.
+fn plan_circle(torque: &Torque, radius: f64, turns: f64, pieces: u32, is_arc: bool) -> Vec<PlannedMove> {
+    let mut look_ahead = LookAhead::with_motors(limits(), motors(torque)).unwrap();
+    let turn = TAU * turns / f64::from(pieces);
+    let point = |angle: f64| [radius * libm::cos(angle), radius * libm::sin(angle), 0.0, 0.0];
+    for index in 0..pieces {
+        let start_angle = turn * f64::from(index);
+        let bend = Bend {
+            normal: 2,
+            centre: [0.0; 2],
+            start_angle,
+            turn,
+            radii: [radius; 2],
+            rise: 0.0,
+            continues: index > 0,
+            arc_length: radius * TAU * turns,
+        };
+        let [from, to] = [start_angle, turn * f64::from(index + 1)].map(point);
+        let request = MoveRequest { from, to, feed: MmPerS(2000.0), tag: index };
+        look_ahead.push_along(&request, Some(&bend).filter(|_| is_arc)).unwrap();
+    }
+    look_ahead.flush();
+    std::iter::from_fn(|| look_ahead.pop()).collect()
+}
+
+#[test]
+fn an_arc_asks_no_motor_for_more_than_it_has_while_it_turns_and_speeds_up() {
+    for radius in [1.0, 5.0, 20.0, 100.0, 400.0] {
+        let planned = plan_circle(&torque(), radius, 2.0, 600, true);
+        let most = planned.iter().map(|one| most_asked(&torque(), one)).fold(0.0, f64::max);
+        assert!((0.8..=1.0 + 1e-6).contains(&most), "{most} at {radius}");
+    }
+}
+
+#[test]
+fn a_circle_of_chords_asks_no_motor_for_more_than_it_has() {
+    for radius in [1.0, 5.0, 20.0, 100.0, 400.0] {
+        let planned = plan_circle(&torque(), radius, 2.0, 1000, false);
+        for one in &planned {
+            check_torque(&torque(), one);
+        }
+        let most = most_asked_between(&torque(), &planned);
+        assert!((0.8..=1.0 + 1e-6).contains(&most), "{most} at {radius}");
+        // Over many pieces at once, too.
+        let far = |axis: usize, [a, b]: [&PlannedMove; 2]| {
+            let [start, end] = [a, b].map(|one| one.start_velocity * one.direction[axis]);
+            asked(&torque(), 0.5 * (start + end), (end - start) / (b.start_time - a.start_time))
+        };
+        for pair in planned.windows(9) {
+            let most = (0..2).map(|axis| far(axis, [&pair[0], &pair[8]])).fold(0.0, f64::max);
+            assert!(most <= 1.02, "{most} at {radius}");
         }
     }
 }
@@ -343,6 +423,27 @@ proptest! {
             }
             before = Some(one);
         }
+    }
+
+    #[test]
+    fn no_circle_asks_a_motor_for_more_than_it_has(
+        torque in any_torque(),
+        radius in 0.5..300.0_f64,
+        turns in 0.05..2.0_f64,
+        pieces in 100_u32..800,
+    ) {
+        if torque.ability().is_err() {
+            return Ok(());
+        }
+        for planned in plan_circle(&torque, radius, turns, pieces, true) {
+            let most = most_asked(&torque, &planned);
+            prop_assert!(most <= 1.0 + 1e-6, "{} {:?}", most, planned);
+            prop_assert!(planned.gap_mm() < 1e-9);
+        }
+        let chords = plan_circle(&torque, radius, turns, pieces, false);
+        prop_assert!(chords.iter().all(|one| most_asked(&torque, one) <= 1.0 + 1e-9 && one.gap_mm() < 1e-9));
+        let most = most_asked_between(&torque, &chords);
+        prop_assert!(most <= 1.0 + 1e-6, "{}", most);
     }
 
     #[test]

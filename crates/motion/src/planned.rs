@@ -4,6 +4,11 @@ use crate::Bend;
 use crate::junction::Entry;
 use crate::motor::MotorAbility;
 
+/// Steps in the search for the time at which a place is passed …
+const ITERATIONS: u32 = 60;
+/// … and how near they get, s.
+const TIME_ERROR_S: f64 = 1e-13;
+
 /// A stretch of a move whose acceleration changes evenly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase {
@@ -30,6 +35,27 @@ impl Phase {
     /// Speed `time` seconds after the start of the phase, mm/s.
     pub fn velocity_at(&self, time: f64) -> f64 {
         self.velocity + (self.accel + 0.5 * self.jerk * time) * time
+    }
+
+    /// When it gets to a distance: it never goes back. Newton's steps where they stay inside, halving where not.
+    pub(crate) fn time_at(&self, distance: f64) -> f64 {
+        let (mut low, mut high) = (0.0, self.duration);
+        let mut time = 0.5 * self.duration;
+        for _ in 0..ITERATIONS {
+            let ahead = self.distance_at(time) - distance;
+            if ahead < 0.0 {
+                low = time;
+            } else {
+                high = time;
+            }
+            let step = time - ahead / self.velocity_at(time);
+            let next = if step > low && step < high { step } else { 0.5 * (low + high) };
+            if (next - time).abs() <= TIME_ERROR_S {
+                return next;
+            }
+            time = next;
+        }
+        time
     }
 }
 

@@ -122,6 +122,17 @@ impl Limits {
             .fold(0.0, |longest, speed| longest.max(self.way(End { speed, is_free: false }, from)))
     }
 
+    /// The speed of an end that slowing down at once from a speed leads to after `length`; where one could come to rest
+    /// before, that from which the way is longest.
+    pub(crate) fn brake(&self, start: End, end: End, length: f64) -> f64 {
+        let way = |speed: f64| self.way_between(start, End { speed, ..end });
+        let turning = (self.accel * self.accel / (2.0 * self.jerk)).min(start.speed);
+        let third = start.speed / 3.0;
+        let longest = if way(turning) > way(third) { turning } else { third };
+        let at = |share: f64| start.speed - share * (start.speed - longest);
+        at(highest(0.0, 1.0, |share| way(at(share)) <= length))
+    }
+
     /// The highest speed of an end, not above what it has, that `length` leads to from a lower one.
     pub(crate) fn reach(&self, from: End, end: End, length: f64) -> f64 {
         highest(from.speed, end.speed, |speed| self.way_between(from, End { speed, ..end }) <= length)

@@ -69,7 +69,7 @@ impl Window {
     }
 
     pub(crate) fn push(&mut self, mut entry: Entry) {
-        if let Some(previous) = self.entries.back() {
+        if let Some(previous) = self.entries.back_mut() {
             entry.follow(previous, &self.motors);
         }
         self.nominal_time += entry.nominal_time;
@@ -91,7 +91,9 @@ impl Window {
         print_time: &mut f64,
         out: &mut VecDeque<PlannedMove>,
     ) {
-        self.plan(count >= self.len());
+        let stops = count >= self.len();
+        self.entries.back_mut().filter(|_| stops).map(Entry::end);
+        self.plan(stops);
         self.release(count.min(self.len()), print_time, out);
         let (Some(first), Some(end_v2)) = (self.entries.front_mut(), self.released_end_v2) else { return };
         // The junction is now fixed: to both profiles it is a limit like that of a corner.

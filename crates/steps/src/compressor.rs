@@ -12,13 +12,15 @@
 
 use crate::crossing::Piece;
 use crate::stabbing::{FIT_STEPS_MAX, Stabbing, larger, smaller};
-use crate::windows::{Steps, append_errors, longest_gap};
+use crate::windows::{Steps, append_errors, longest_gap, shortest_gap};
 use crate::{IDLE_TICKS_MAX, StepCommand, StepCommandKind};
 use std::collections::VecDeque;
 use units::{Seconds, Ticks};
 
 /// Steps of one motor that are taken at a time.
 pub(crate) const TURN_STEPS: u32 = 128;
+/// Where those cannot be taken together, so many are.
+const PART_STEPS: usize = 16;
 /// The most steps of one motor that wait for their command to be closed.
 pub const STEPS_BUFFERED_MAX: usize = (FIT_STEPS_MAX + TURN_STEPS) as usize + 2;
 /// A step is given out once the plan is known this far beyond it.
@@ -172,8 +174,16 @@ impl Compressor {
             self.times.extend(rest);
         }
         if fresh < self.times.len() && !self.take_run(fresh) {
-            for time in self.times.split_off(fresh) {
-                self.step(time, forward);
+            // Too much at once, or something among them.
+            for part in self.times.split_off(fresh).chunks(PART_STEPS) {
+                let fresh = self.times.len();
+                self.times.extend_from_slice(part);
+                if !self.take_run(fresh) {
+                    self.times.truncate(fresh);
+                    for &time in part {
+                        self.step(time, forward);
+                    }
+                }
             }
         }
         last
@@ -183,16 +193,19 @@ impl Compressor {
     /// for more than that.
     fn take_run(&mut self, fresh: usize) -> bool {
         let times = &self.times[fresh - 1..];
-        let known = self.errors.len();
-        self.errors.push(self.error(self.gap_before, times[1] - times[0]));
-        let shortest = append_errors(times, self.max_error, GAP_SHARE, &mut self.errors);
         let last = times[times.len() - 1];
+        let shortest = shortest_gap(times);
         let is_usual = shortest >= self.gap_min
             && last - self.times[self.first] <= self.span_max
             && (last - times[0] <= self.hold_max || longest_gap(times) <= self.hold_max);
         if !is_usual {
-            self.errors.truncate(known);
             return false;
+        }
+        self.errors.push(self.error(self.gap_before, times[1] - times[0]));
+        if GAP_SHARE * shortest >= self.max_error {
+            self.errors.resize(self.errors.len() + times.len() - 2, self.max_error);
+        } else {
+            append_errors(times, self.max_error, GAP_SHARE, &mut self.errors);
         }
         self.tally.gap_min = smaller(self.tally.gap_min, shortest);
         self.gap_before = times[times.len() - 1] - times[times.len() - 2];
@@ -354,7 +367,7 @@ impl Compressor {
     fn emit(&mut self) {
         let mut record = self.tally.error_max;
         let steps = steps_from(self.base_ticks, &self.times, &self.errors, self.first);
-        let fit = self.stabbing.fit(&steps, &mut record);
+        let fit = self.stabbing.fit(&steps, self.max_error, &mut record);
         let (interval, add, count) = (f64::from(fit.interval), f64::from(fit.add), f64::from(fit.count));
         // Floats hold these integers exactly.
         let clock = self.base_ticks + count * (interval + 0.5 * add * (count - 1.0));
@@ -409,4 +422,41 @@ impl Compressor {
 /// The steps from index `first` on whose windows are known.
 fn steps_from<'a>(base: f64, times: &'a [f64], errors: &'a [f64], first: usize) -> Steps<'a> {
     Steps { base, times: &times[first..errors.len()], errors: &errors[first..] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Segment;
+    use crate::crossing::Grid;
+
+    #[test]
+    fn steps_taken_together_are_packed_as_one_by_one() {
+        // From 3000 steps a second down to one in 140 ms, in turns that are quick, too long for a command, and held back.
+        let grid = Grid { steps_per_mm: 100.0, ticks_per_s: 12e6 };
+        let (mut together, mut alone) =
+            (Compressor::new(0, 12e6, Seconds(25e-6)), Compressor::new(0, 12e6, Seconds(25e-6)));
+        let (mut start_time, mut start, mut count) = (1.0, 0.0, 0);
+        for velocity in [30.0, 10.0, 5.0, 2.5, 1.0, 0.5, 0.07_f64, 4.0] {
+            let powers = [velocity, -0.02 * velocity, 0.0, 0.0, 0.0];
+            let mut segment = Segment { start_time, duration: 2.0, start, end: 0.0, powers };
+            segment.end = start + segment.way(2.0);
+            (start_time, start) = (start_time + 2.0, segment.end);
+            grid.split(&segment, &mut count, &mut |mut piece| {
+                let mut times = Vec::new();
+                let mut copy = piece;
+                copy.append_times(piece.steps as u32, &mut times);
+                for time in times {
+                    alone.step(time, copy.forward);
+                }
+                while piece.steps > 0 {
+                    together.take_from(&mut piece);
+                }
+            });
+        }
+        together.end();
+        alone.end();
+        assert!(together.out.len() > 20 && together.tally.steps == count as u64);
+        assert_eq!(together.out, alone.out);
+    }
 }

@@ -7,9 +7,9 @@ use crate::segment::DEGREE_MAX;
 use crate::stabbing::{larger, smaller};
 use crate::windows::append_each;
 
-/// How near (ticks) two approximations of a step's time are when the last one counts: its own error is the square of it
-/// in shares of the piece, far below.
-const NEAR_TICKS: f64 = 1e-3;
+/// How near two approximations of a step's time are when the last one counts, in shares of its gap to the step before: the
+/// error left is about the square of that.
+const NEAR_SHARE: f64 = 1e-4;
 /// Approximations of one step's time: halvings alone would need as many for the longest piece.
 const APPROXIMATIONS_MAX: u32 = 64;
 
@@ -195,6 +195,13 @@ fn way(powers: &[f64; DEGREE_MAX], u: f64) -> f64 {
     (c1 + (c2 + (c3 + (c4 + c5 * u) * u) * u) * u) * u
 }
 
+/// `c₁ + 2·c₂·u + 3·c₃·u² + …`
+#[inline]
+fn slope(powers: &[f64; DEGREE_MAX], u: f64) -> f64 {
+    let [c1, c2, c3, c4, c5] = *powers;
+    c1 + (2.0 * c2 + (3.0 * c3 + (4.0 * c4 + 5.0 * c5 * u) * u) * u) * u
+}
+
 impl Piece {
     /// Whether the steps come faster than `rate` (steps a tick) on average.
     pub(crate) fn is_faster_than(&self, rate: f64) -> bool {
@@ -216,7 +223,7 @@ impl Piece {
                 append_each(count, move |index| start + curve.time(index, duration), out);
                 quadratic.passed += f64::from(count);
             }
-            Curve::Higher(higher) => out.extend((0..count).map(|_| start + higher.next(duration) * duration)),
+            Curve::Higher(higher) => out.extend((0..count).map(|_| start + higher.next() * duration)),
         }
     }
 }
@@ -237,27 +244,32 @@ impl Quadratic {
 impl Higher {
     /// Share of the segment's time.
     #[inline(never)]
-    fn next(&mut self, duration: f64) -> f64 {
-        let [c1, c2, c3, c4, c5] = self.powers;
-        let slopes = [2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5];
+    fn next(&mut self) -> f64 {
         let (mut low, mut high) = (self.low.0, self.high.0);
-        let near = NEAR_TICKS / duration;
-        let rise = (self.edge - self.low.1) / (self.high.1 - self.low.1);
-        let mut at = low + (high - low) * if (0.0..=1.0).contains(&rise) { rise } else { 0.5 };
+        let mut at = self.guess();
         for _ in 0..APPROXIMATIONS_MAX {
             let beyond = (way(&self.powers, at) - self.edge) * self.step;
             *(if beyond < 0.0 { &mut low } else { &mut high }) = at;
-            let slope = c1 + (slopes[0] + (slopes[1] + (slopes[2] + slopes[3] * at) * at) * at) * at;
-            let newton = at - beyond * self.step / slope;
+            let newton = at - beyond * self.step / slope(&self.powers, at);
             let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
             let moved = (next - at).abs();
             at = next;
-            if moved <= near {
+            if moved <= NEAR_SHARE * (at - self.low.0) {
                 break;
             }
         }
         self.low = (at, self.edge);
         self.edge += self.step;
         at
+    }
+
+    /// Where the next crossing is on the parabola through both ends of the part that is left, with its slope at the lower one.
+    fn guess(&self) -> f64 {
+        let (width, height) = (self.high.0 - self.low.0, self.high.1 - self.low.1);
+        let rise = (self.edge - self.low.1) / height;
+        let slope = slope(&self.powers, self.low.0) * width / height;
+        let root = larger(slope * slope + 4.0 * (1.0 - slope) * rise, 0.0).sqrt();
+        let share = 2.0 * rise / (slope + root);
+        self.low.0 + width * if (0.0..=1.0).contains(&share) { share } else { 0.5 }
     }
 }

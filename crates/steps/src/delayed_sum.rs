@@ -5,7 +5,6 @@
 
 use crate::Segment;
 use crate::stabbing::{larger, smaller};
-use std::collections::VecDeque;
 
 /// Shorter segments are joined, and the path through them taken as straight: at 3000 mm/s² it is 2·10⁻⁷ mm off then. So
 /// a file of dust fills no memory.
@@ -15,6 +14,9 @@ pub(crate) const WINDOW_MAX: f64 = 0.5;
 /// The most segments that a sum holds: in its window, and in the move that was pushed last.
 pub const SEGMENTS_HELD_MAX: usize = (2.0 * WINDOW_MAX / SHORT) as usize + 256;
 
+/// Segments that all copies have passed are removed when they are more than this, and no fewer than the others.
+const GONE_MAX: usize = 64;
+
 /// One copy of the path.
 #[derive(Clone, Copy, Debug)]
 struct Tap {
@@ -23,6 +25,8 @@ struct Tap {
     weight: f64,
     /// The segment that it is in.
     index: usize,
+    /// When it leaves that, by the sum's time, as of the last look.
+    until: f64,
 }
 
 /// A stretch of the sum; positions count from `reference`.
@@ -45,7 +49,9 @@ pub(crate) struct Sum {
 pub(crate) struct DelayedSum {
     /// Those that look farthest ahead first.
     taps: Vec<Tap>,
-    segments: VecDeque<Segment>,
+    /// Before `first`, some that all copies have passed.
+    segments: Vec<Segment>,
+    first: usize,
     /// Short segments that wait for more of their kind.
     short: Option<Segment>,
     time: f64,
@@ -54,8 +60,8 @@ pub(crate) struct DelayedSum {
 impl DelayedSum {
     /// `taps`: how far ahead (s, falling) and with which weight.
     pub(crate) fn new(taps: &[(f64, f64)]) -> Self {
-        let taps = taps.iter().map(|&(ahead, weight)| Tap { ahead, weight, index: 0 }).collect();
-        Self { taps, segments: VecDeque::new(), short: None, time: 0.0 }
+        let taps = taps.iter().map(|&(ahead, weight)| Tap { ahead, weight, index: 0, until: 0.0 }).collect();
+        Self { taps, segments: Vec::new(), first: 0, short: None, time: 0.0 }
     }
 
     /// How far the sum looks ahead, s.
@@ -70,13 +76,14 @@ impl DelayedSum {
 
     /// Segments held.
     pub(crate) fn held(&self) -> usize {
-        self.segments.len()
+        self.segments.len() - self.first
     }
 
     /// Starts at time 0, after a rest.
     pub(crate) fn begin(&mut self, position: f64) {
         self.segments.clear();
-        self.segments.push_back(Segment::rest(-self.tail(), self.tail(), position));
+        self.first = 0;
+        self.segments.push(Segment::rest(-self.tail(), self.tail(), position));
         self.short = None;
         self.time = 0.0;
         for tap in &mut self.taps {
@@ -91,7 +98,7 @@ impl DelayedSum {
 
     /// The path so far ends there.
     fn end(&self) -> (f64, f64) {
-        let last = self.short.as_ref().or(self.segments.back());
+        let last = self.short.as_ref().or(self.segments.last());
         last.map_or((0.0, 0.0), |last| (last.end_time(), last.end))
     }
 
@@ -107,7 +114,7 @@ impl DelayedSum {
     pub(crate) fn rest_at(&mut self, time: f64, position: f64) {
         self.close_short();
         let (end_time, _) = self.end();
-        match self.segments.back_mut() {
+        match self.segments.last_mut() {
             Some(last) if last.is_rest() && last.start == position => {
                 last.duration = larger(last.duration, time - last.start_time);
                 // Copies that had left it are in it again: however short the moves are in which an axis stands still, they
@@ -118,7 +125,7 @@ impl DelayedSum {
                 }
             }
             _ if time > end_time => {
-                self.segments.push_back(Segment::rest(end_time, time - end_time, position));
+                self.segments.push(Segment::rest(end_time, time - end_time, position));
             }
             _ => {}
         }
@@ -128,7 +135,7 @@ impl DelayedSum {
     pub(crate) fn push(&mut self, segment: Segment) {
         if segment.duration >= SHORT {
             self.close_short();
-            self.segments.push_back(segment);
+            self.segments.push(segment);
             return;
         }
         let first = self.short.unwrap_or(segment);
@@ -144,7 +151,7 @@ impl DelayedSum {
         let Some(mut short) = self.short.take() else { return };
         if short.duration > 0.0 {
             short.powers = [(short.end - short.start) / short.duration, 0.0, 0.0, 0.0, 0.0];
-            self.segments.push_back(short);
+            self.segments.push(short);
         }
     }
 
@@ -152,25 +159,25 @@ impl DelayedSum {
     pub(crate) fn next(&mut self) -> Option<Sum> {
         loop {
             let mut end = f64::INFINITY;
-            for tap in &self.taps {
-                end = smaller(end, self.segments.get(tap.index)?.end_time() - tap.ahead);
+            for tap in &mut self.taps {
+                tap.until = self.segments.get(tap.index)?.end_time() - tap.ahead;
+                end = smaller(end, tap.until);
             }
             let sum = (end > self.time).then(|| self.sum(end));
             self.time = larger(self.time, end);
             let mut done = usize::MAX;
             for tap in &mut self.taps {
-                if self.segments[tap.index].end_time() - tap.ahead <= end {
-                    tap.index += 1;
-                }
+                tap.index += usize::from(tap.until <= end);
                 done = done.min(tap.index);
             }
             // What the last copy has passed; one stays, so that the path's end is known.
-            let done = done.min(self.segments.len() - 1);
-            if done > 0 {
-                self.segments.drain(..done);
+            self.first = done.min(self.segments.len() - 1);
+            if self.first > GONE_MAX && self.first >= self.held() {
+                self.segments.drain(..self.first);
                 for tap in &mut self.taps {
-                    tap.index -= done;
+                    tap.index -= self.first;
                 }
+                self.first = 0;
             }
             if sum.is_some() {
                 return sum;

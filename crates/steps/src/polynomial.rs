@@ -44,14 +44,15 @@ fn derivative(coefficients: &[f64]) -> [f64; ROOTS_MAX] {
 /// Where a polynomial of degree 4 at most (constant first) changes its sign within 0 < u < 1.
 pub(crate) fn sign_changes(coefficients: &[f64]) -> Roots {
     let mut roots = Roots::default();
+    // What is left of them is of their degree, or a constant.
+    let mut coefficients = coefficients;
+    while let [lower @ .., 0.0] = coefficients {
+        coefficients = lower;
+    }
     let Some((&constant, rest)) = coefficients.split_first() else { return roots };
     // The constant outweighs all else: the usual case.
-    if rest.iter().map(|coefficient| coefficient.abs()).sum::<f64>() < constant.abs() {
+    if rest.is_empty() || rest.iter().fold(0.0, |sum, coefficient| sum + coefficient.abs()) < constant.abs() {
         return roots;
-    }
-    let Some((&highest, lower)) = coefficients.split_last() else { return roots };
-    if highest == 0.0 {
-        return sign_changes(lower);
     }
     let slope = derivative(coefficients);
     let slope = &slope[..coefficients.len() - 1];

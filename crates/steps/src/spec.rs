@@ -96,6 +96,7 @@ pub struct MotorStats {
     pub direction_changes: u64,
     /// The fastest two steps of one direction followed each other, in steps a second; 0 where none did.
     pub peak_steps_per_s: f64,
-    /// The worst distance of a step from the time at which it was due.
+    /// The worst distance of a step from the time at which it was due; where it comes within a tick of what a step may be off,
+    /// that.
     pub max_error: Seconds,
 }

@@ -136,14 +136,20 @@ impl Stabbing {
         }
     }
 
-    /// The command found. Its last step comes as near as may be to when it is due; the farthest that a step is off goes into `record`.
-    pub(crate) fn fit(&mut self, steps: &Steps<'_>, record: &mut f64) -> Fit {
+    /// The command found. Its last step comes as near as may be to when it is due. The farthest that a step is off goes into `record`:
+    /// no window is wider than `most`, and what has come within a tick of that is `most`, whatever follows.
+    pub(crate) fn fit(&mut self, steps: &Steps<'_>, most: f64, record: &mut f64) -> Fit {
         // A window without a whole tick in it is served as near as can be.
         let count = self.best.passed.max(1);
         self.seed = (count as usize * 3 / 4).clamp(SEED_MIN, SEED_MAX);
         let steps = steps.first(count as usize);
         let fit = Fit::new(&self.best, count, steps.times[count as usize - 1] - steps.base);
-        *record = larger(*record, steps.worst(f64::from(fit.interval), f64::from(fit.add)));
+        if *record < most || self.best.passed == 0 {
+            *record = larger(*record, steps.worst(f64::from(fit.interval), f64::from(fit.add)));
+            if *record > most - 1.0 {
+                *record = larger(*record, most);
+            }
+        }
         fit
     }
 
@@ -298,7 +304,7 @@ mod tests {
                 candidate.passed
             };
             let mut record = 0.0;
-            let fit = stabbing.fit(&steps, &mut record);
+            let fit = stabbing.fit(&steps, 1e3, &mut record);
             prop_assert_eq!(fit.count, (-1000..1000).map(reach).max().unwrap_or(0));
             prop_assert!(record <= error && is_closed <= (fit.count < 30));
         }

@@ -187,29 +187,24 @@ fn ends(at: &Candidate, lows: &Lanes, highs: &Lanes, rises: &Lanes) -> (f64, f64
 }
 
 /// Appends what each step but the first and the last of `times` may be off: at most `max_error`, and `share` of the gap to
-/// either neighbour. Returns the shortest gap. There are at least two times.
-pub(crate) fn append_errors(times: &[f64], max_error: f64, share: f64, errors: &mut Vec<f64>) -> f64 {
-    let gap = times[1] - times[0];
-    let known = errors.len();
-    errors.resize(known + times.len() - 2, 0.0);
-    let (errors, late_errors) = errors[known..].as_chunks_mut::<LANES>();
-    let late = LANES * errors.len();
-    let (before, now, after) = (times.as_chunks().0, times[1..].as_chunks().0, times[2..].as_chunks().0);
-    let mut shortest = [gap; LANES];
-    for (((errors, before), now), after) in errors.iter_mut().zip(before).zip(now).zip(after) {
-        let before = map2(*now, *before, |now, before| now - before);
-        let after = map2(*after, *now, |after, now| after - now);
-        let nearer = map2(before, after, smaller);
-        *errors = map(nearer, |gap| smaller(share * gap, max_error));
-        shortest = map2(nearer, shortest, smaller);
-    }
-    let mut shortest = reduce(shortest, smaller);
-    for (error, &[before, now, after]) in late_errors.iter_mut().zip(times[late..].array_windows()) {
+/// either neighbour. There are at least two times.
+pub(crate) fn append_errors(times: &[f64], max_error: f64, share: f64, errors: &mut Vec<f64>) {
+    errors.extend(times.array_windows().map(|[before, now, after]| {
         let nearer = smaller(now - before, after - now);
-        *error = smaller(share * nearer, max_error);
-        shortest = smaller(nearer, shortest);
+        smaller(share * nearer, max_error)
+    }));
+}
+
+/// The shortest gap between successive times.
+pub(crate) fn shortest_gap(times: &[f64]) -> f64 {
+    let (before, after) = (times.as_chunks::<LANES>().0, times.get(1..).unwrap_or_default());
+    let (after, late) = after.as_chunks::<LANES>();
+    let mut shortest = [f64::INFINITY; LANES];
+    for (before, after) in before.iter().zip(after) {
+        shortest = map2(map2(*after, *before, |after, before| after - before), shortest, smaller);
     }
-    shortest
+    let late = times[times.len() - late.len() - 1..].array_windows().map(|[before, after]| after - before);
+    late.fold(reduce(shortest, smaller), smaller)
 }
 
 /// The longest gap between successive times.
@@ -219,11 +214,7 @@ pub(crate) fn longest_gap(times: &[f64]) -> f64 {
 
 /// Appends `f(0)`, `f(1)`, … `f(count − 1)`.
 pub(crate) fn append_each(count: u32, f: impl Fn(f64) -> f64, out: &mut Vec<f64>) {
-    let known = out.len();
-    out.resize(known + count as usize, 0.0);
-    for (index, value) in out[known..].iter_mut().enumerate() {
-        *value = f(f64::from(index as i32));
-    }
+    out.extend((0..count as i32).map(|index| f(f64::from(index))));
 }
 
 #[cfg(test)]
@@ -280,13 +271,13 @@ mod tests {
             }
             prop_assert!((steps.worst(interval, add) - worst).abs() < 1e-6);
             let mut made = vec![7.0];
-            let shortest = append_errors(&times, 80.0, 0.25, &mut made);
+            append_errors(&times, 80.0, 0.25, &mut made);
             let by_hand: Vec<f64> = [7.0].into_iter()
                 .chain(times.windows(3).map(|t| 80.0_f64.min(0.25 * (t[1] - t[0]).min(t[2] - t[1]))))
                 .collect();
             prop_assert_eq!(made, by_hand);
             let gaps: Vec<f64> = times.windows(2).map(|t| t[1] - t[0]).collect();
-            prop_assert_eq!(shortest, gaps.iter().copied().fold(f64::INFINITY, f64::min));
+            prop_assert_eq!(shortest_gap(&times), gaps.iter().copied().fold(f64::INFINITY, f64::min));
             prop_assert_eq!(longest_gap(&times), gaps.iter().copied().fold(0.0, f64::max));
             let mut squares = vec![7.0];
             append_each(times.len() as u32, |index| index * index, &mut squares);

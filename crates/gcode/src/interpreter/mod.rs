@@ -19,7 +19,7 @@ use crate::annotation;
 use crate::arc::Plane;
 use crate::diagnostic::{Diagnostic, DiagnosticCode, Severity};
 use crate::lines::{LINE_BYTES_MAX, LineNumber};
-use crate::words::Words;
+use crate::words::{Words, WordsEnd};
 
 /// Millimetres in an inch.
 const INCH_MM: f64 = 25.4;
@@ -317,7 +317,7 @@ impl Interpreter {
         match self.words.scan(bytes, code.end) {
             Ok(end) => {
                 let bare = self.words.bare() & !bare_allowed;
-                (bare == 0 && end.checksum.is_none() && end.unclosed.is_none())
+                (bare == 0 && matches!(end, WordsEnd::Line | WordsEnd::Comment))
                     || self.check_words(bytes, bare, end, out)
             }
             Err(fault) => {

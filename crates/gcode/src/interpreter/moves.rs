@@ -117,7 +117,8 @@ impl Interpreter {
             }
         }
         let [x, y, z, e] = to;
-        if x.abs().max(y.abs()).max(z.abs()) <= POSITION_MAX_MM && e.abs() <= FILAMENT_MAX_MM {
+        let is_within = [x, y, z].iter().all(|axis| axis.abs() <= POSITION_MAX_MM);
+        if is_within && e.abs() <= FILAMENT_MAX_MM {
             return Some(to);
         }
         let letter = self.words.first_of(bits(AXES)).unwrap_or(b'X');

@@ -54,12 +54,13 @@ impl Interpreter {
             out.say(Error, Code::MissingValue, self.words.columns(letter), message);
             return false;
         }
-        if let Some(star) = end.checksum {
-            return checksum_holds(bytes, star, out);
-        }
-        if let Some(open) = end.unclosed {
-            let message = "This `(` is never closed: the rest of the line is taken for a comment.";
-            out.say(Info, Code::MalformedWord, open..bytes.len(), message);
+        match end {
+            WordsEnd::Checksum(star) => return checksum_holds(bytes, star, out),
+            WordsEnd::Unclosed(open) => {
+                let message = "This `(` is never closed: the rest of the line is taken for a comment.";
+                out.say(Info, Code::MalformedWord, open..bytes.len(), message);
+            }
+            WordsEnd::Line | WordsEnd::Comment => {}
         }
         true
     }
