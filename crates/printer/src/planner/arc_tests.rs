@@ -147,37 +147,51 @@ fn any_lines() -> impl Strategy<Value = String> {
     proptest::collection::vec(line, 1..12).prop_map(|lines| lines.concat())
 }
 
+/// Whatever the text says: its moves follow each other, and end where the planner says.
+fn is_planned_or_refused(text: &str) -> Result<(), TestCaseError> {
+    let (mut planner, mut source) = planner();
+    feed(&mut source, &format!("G1 X90 Y90 Z90 F6000\n{text}"));
+    let mut at = [0.0; 4];
+    let limits = planner.limits;
+    // Filament is left out: what is pulled back along a way is not bounded, and each of its steps is made.
+    // A helix of a hundred turns as wide as the machine has fewer pieces.
+    let mut moves = 0_u32;
+    loop {
+        match planner.next(&mut source) {
+            Ok(Planned::EndOfSource) => break,
+            Ok(Planned::RunStarted(position)) => at = position,
+            Ok(Planned::Move(one, _)) => {
+                prop_assert_eq!(one.from, at);
+                prop_assert!(one.duration() > 0.0 && one.duration().is_finite());
+                prop_assert!(
+                    one.cruise_velocity <= limits.max_velocity.0 * (1.0 + 1e-9) || one.bend.is_none()
+                );
+                at = one.to;
+                moves += 1;
+                prop_assert!(moves < 300_000);
+            }
+            Ok(_) => {}
+            Err(error) => {
+                prop_assert!(!planner.is_broken(), "{}", error);
+                planner.correct(&mut source);
+            }
+        }
+    }
+    prop_assert_eq!(at, planner.position());
+    Ok(())
+}
+
+#[test]
+fn a_move_without_length_leaves_the_machine_where_it_is() {
+    is_planned_or_refused("G91\nG3 Y0.000000001 I-0.1615111262282972 J97.68053151885341\n").unwrap();
+    is_planned_or_refused(&format!("G91\n{}", "G1 X0.0000000004\n".repeat(9))).unwrap();
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
     #[test]
     fn any_arcs_are_planned_or_refused(text in any_lines()) {
-        let (mut planner, mut source) = planner();
-        feed(&mut source, &format!("G1 X90 Y90 Z90 F6000\n{text}"));
-        let mut at = [0.0; 4];
-        let limits = planner.limits;
-        // Filament is left out: what is pulled back along a way is not bounded, and each of its steps is made.
-        // A helix of a hundred turns as wide as the machine has fewer pieces.
-        let mut moves = 0_u32;
-        loop {
-            match planner.next(&mut source) {
-                Ok(Planned::EndOfSource) => break,
-                Ok(Planned::RunStarted(position)) => at = position,
-                Ok(Planned::Move(one, _)) => {
-                    prop_assert_eq!(one.from, at);
-                    prop_assert!(one.duration() > 0.0 && one.duration().is_finite());
-                    prop_assert!(one.cruise_velocity <= limits.max_velocity.0 * (1.0 + 1e-9) || one.bend.is_none());
-                    at = one.to;
-                    moves += 1;
-                    prop_assert!(moves < 300_000);
-                }
-                Ok(_) => {}
-                Err(error) => {
-                    prop_assert!(!planner.is_broken(), "{}", error);
-                    planner.correct(&mut source);
-                }
-            }
-        }
-        prop_assert_eq!(at, planner.position());
+        is_planned_or_refused(&text)?;
     }
 }

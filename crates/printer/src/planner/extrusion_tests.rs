@@ -78,3 +78,24 @@ fn at_every_pulse_the_filament_is_what_the_path_drawn_takes() {
     }
     assert!(looked_at > 3000 && ramps > 1000, "{looked_at} pulses, {ramps} of them in ramps");
 }
+
+#[test]
+fn filament_over_next_to_no_way_is_pushed_on_the_spot() {
+    for way in ["X20.0000005", "X19.9999995 Y20.0000005", "Z5.0000009"] {
+        let (mut planner, mut source) = planner();
+        source.feed(format!("M83\nG1 X20 Y20 Z5 F6000\nG1 {way} E5 F1200\nG1 X30 E0.5\n").as_bytes());
+        source.end();
+        let mut moves = Vec::new();
+        loop {
+            match planner.next(&mut source).unwrap() {
+                Planned::Move(made, _) => moves.push(made),
+                Planned::EndOfSource => break,
+                _ => {}
+            }
+        }
+        let [.., pushed, drawn] = &moves[..] else { panic!("{moves:?}") };
+        assert_eq!((pushed.from[..3].to_vec(), pushed.length), (pushed.to[..3].to_vec(), 5.0), "{way}");
+        assert!(pushed.cruise_velocity <= 20.0, "{way}: {pushed:?}");
+        assert_eq!((drawn.from, drawn.to), (pushed.to, planner.position()), "{way}");
+    }
+}

@@ -6,6 +6,7 @@
 use gcode::{LineNumber, Move};
 use motion::Bend;
 
+use super::Position;
 use crate::{
     config::PrinterConfig,
     error::{ErrorCode, PrinterError},
@@ -162,7 +163,23 @@ impl Guard {
     }
 }
 
+/// Where a move really ends: filament that is pushed or pulled with next to no travel leaves the head where it is, and so
+/// little of both leaves everything.
+pub(crate) fn settled(from: Position, to: Position) -> Position {
+    let [x, y, z, filament] = core::array::from_fn(|axis| to[axis] - from[axis]);
+    let (travel, filament) = (libm::sqrt(x * x + y * y + z * z), filament.abs());
+    if travel.max(filament) < NOTHING_MM {
+        from
+    } else if travel < ON_THE_SPOT_MM && filament > travel {
+        [from[0], from[1], from[2], to[3]]
+    } else {
+        to
+    }
+}
+
 /// What offsets and inches leave of a place that is named again is no way, in mm.
 const ON_THE_SPOT_MM: f64 = 1e-6;
+/// A move without length, in mm: the look-ahead drops it.
+const NOTHING_MM: f64 = 1e-9;
 /// See [`Guard::judge`]: extrusion over less than this travel is not judged by its ratio, in mm.
 const DAB_MM: f64 = 0.4;

@@ -39,6 +39,7 @@ use units::{Hertz, MmPerS, Seconds, Ticks};
 
 use dynamics::Course;
 pub use estimates::{Estimates, FEATURE_NAMES, LayerTotal, MoveEstimate, MoveKind, Total};
+pub(crate) use guard::settled;
 pub use guard::{ExtrusionPermit, Guard};
 pub use item::{Barrier, Planned, Position, TimedAction};
 use paces::Paces;
@@ -352,9 +353,11 @@ impl Planner {
         line: LineNumber,
         pace: Pace,
     ) -> Result<(), PrinterError> {
+        let to = settled(self.position, to);
         if to == self.position {
             return Ok(());
         }
+        let bend = bend.filter(|_| to[..EXTRUDER] != self.position[..EXTRUDER]);
         for end in arcs::straight_ends(self.position, to, bend) {
             self.step_rates.judge_request(self.position, end, feed, &self.limits, line)?;
         }
@@ -372,13 +375,13 @@ impl Planner {
         let before = self.look_ahead.len();
         let request = MoveRequest { from: self.position, to, feed, tag: line.0 };
         self.look_ahead.push_along(&request, bend).map_err(|error| wrong(&error).at_line(line.0))?;
-        // The look-ahead drops moves without length.
+        // The look-ahead drops moves without length: the machine is where its plan ends.
         let pushed = (self.look_ahead.len() - before) as u64;
         if pushed > 0 {
             self.paces.push(self.moves_pushed, pace);
+            self.position = to;
         }
         self.moves_pushed += pushed;
-        self.position = to;
         if let Some(bound) = &mut self.bound {
             bound.push_along(&request, bend, &self.limits);
         }

@@ -15,8 +15,8 @@ use super::vertex::FEATURES;
 use crate::{
     config::PrinterConfig,
     error::PrinterError,
-    machine,
-    planner::{MoveEstimate, MoveKind, PLAN_CLOCK},
+    machine::{self, EXTRUDER},
+    planner::{MoveEstimate, MoveKind, PLAN_CLOCK, Position, settled},
     step_rate::StepRates,
 };
 
@@ -50,6 +50,8 @@ pub(super) struct Estimate {
     /// The first move that is found to be too fast for its motors, until it is taken.
     pub(super) too_fast: Option<PrinterError>,
     running: bool,
+    /// Where the last move pushed ends.
+    at: Position,
     total_s: f64,
     failed: bool,
     pub(super) feature_s: [f64; FEATURES],
@@ -70,6 +72,7 @@ impl Estimate {
             step_rates: StepRates::new(config, PLAN_CLOCK),
             too_fast: None,
             running: false,
+            at: [0.0; 4],
             total_s: 0.0,
             failed: false,
             feature_s: [0.0; FEATURES],
@@ -79,10 +82,14 @@ impl Estimate {
 
     pub(super) fn mv(&mut self, asking: &Asking<'_>) {
         let Asking { mv, bend, segment, layer, vertex } = *asking;
-        let (from, to) = (mv.from.to_array(), mv.to.to_array());
-        if from == to {
+        let from = mv.from.to_array();
+        let at = if self.running { self.at } else { from };
+        let to = settled(at, mv.to.to_array());
+        if at == to {
             return;
         }
+        self.at = to;
+        let bend = bend.filter(|bend| to[..EXTRUDER] != at[..EXTRUDER] && bend.fits(&from, &to));
         if !self.running {
             self.look_ahead.begin_run();
             self.running = true;
@@ -93,7 +100,7 @@ impl Estimate {
         };
         let request = MoveRequest { from, to, feed: mv.feed, tag: layer << TAG_BITS | feature };
         let before = self.look_ahead.len();
-        if self.look_ahead.push_along(&request, bend.filter(|bend| bend.fits(&from, &to))).is_err() {
+        if self.look_ahead.push_along(&request, bend).is_err() {
             self.failed = true;
             self.look_ahead.begin_run();
             self.asked.clear();
