@@ -12,7 +12,7 @@ use virtual_printer::BoardProfile;
 
 use crate::{
     bench::{Bench, Pulse, Setup},
-    print::{START, squares},
+    print::squares,
 };
 
 /// No heat: what becomes of that is told elsewhere.
