@@ -109,31 +109,6 @@ fn losses_are_not_multiplied_by_the_answers_to_them() {
 }
 
 #[test]
-fn a_line_that_only_holds_bytes_up_is_not_filled_with_repetitions() {
-    // It answers within 3 ms as long as it is idle, and a window of blocks takes it ten times as long and more: the first
-    // of them are sent again before they are answered, and that must not go on.
-    const LINES: u32 = 100;
-    let (mut sum, mut slowest) = (0.0, f64::INFINITY);
-    for seed in 0..LINES {
-        let mut line = Line::new(Conditions { stall: 0.01, ..Conditions::USB }, u64::from(seed));
-        for number in 0..20 {
-            line.link.queue(message(Lane::Control, number)).unwrap();
-            let until_s = line.now_s + 0.1;
-            line.run(until_s, |_| false);
-        }
-        line.board.taken.clear();
-        let before = line.link.stats();
-        slowest = flood(&mut line, 2400).min(slowest);
-        let after = line.link.stats();
-        let again = (after.bytes_retransmitted - before.bytes_retransmitted) as f64;
-        sum += again / ((after.bytes_sent - before.bytes_sent) as f64 - again);
-    }
-    let mean = sum / f64::from(LINES);
-    assert!(mean < 0.08, "{mean:.3} of all bytes are sent again");
-    assert!(slowest > 2500.0, "{slowest:.0} bytes a second");
-}
-
-#[test]
 fn the_number_of_calls_is_that_of_the_events() {
     let mut line = Line::new(Conditions { corrupt: 0.01, ..Conditions::USB }, 4);
     flood(&mut line, 2000);

@@ -107,10 +107,8 @@ pub(super) struct Window {
     transmissions: u64,
     /// The place of the transmission that the next answer belongs to.
     unanswered: u64,
-    /// The same, should answers that were given up come after all: a line may only hold bytes up.
-    unanswered_if_late: u64,
-    /// When that was last found out, they came.
-    answers_late: bool,
+    /// So many answers were given up and may come after all.
+    late_answers: u64,
     /// The board asked for the front again.
     send_again: bool,
     /// The board asked for the front, but perhaps before it was sent for the last time.
@@ -144,8 +142,7 @@ impl Window {
             resent_below: 0,
             transmissions: 0,
             unanswered: 0,
-            unanswered_if_late: 0,
-            answers_late: true,
+            late_answers: 0,
             send_again: false,
             suspect: false,
             last_progress_s: 0.0,
@@ -278,10 +275,8 @@ impl Window {
             return Some(f64::NEG_INFINITY);
         }
         let timeout_s = front.last_s.max(self.last_progress_s) + self.round_trip.timeout_s();
-        // Where answers come late they also come later than was thought.
-        let answer_s_max = if self.awaits_late() { 2.0 } else { 1.0 } * self.round_trip.answer_s_max();
-        let silence_s = self.last_answer_s + 0.5 * answer_s_max;
-        let suspicion_s = silence_s.max(front.last_s + answer_s_max);
+        let silence_s = self.last_answer_s + 0.5 * self.round_trip.answer_s_max();
+        let suspicion_s = silence_s.max(front.last_s + self.round_trip.answer_s_max());
         Some(if self.suspect { timeout_s.min(suspicion_s) } else { timeout_s })
     }
 
@@ -297,8 +292,8 @@ impl Window {
         if !self.send_again {
             // Whatever has not been answered by now will not be, or late: the line may only hold bytes up. Such an answer
             // looks as if what is sent now had been lost; taken so, it fills the line with repetitions, and what is
-            // answered then comes later still. So from here on answers are counted both ways.
-            self.answers_late &= !self.suspect;
+            // answered then comes later still.
+            self.late_answers = self.transmissions - self.unanswered;
             self.unanswered = self.transmissions;
         }
         self.loss.lost();
@@ -315,11 +310,6 @@ impl Window {
         }
         self.resent_below = self.expected + self.sent.len() as u64;
         Some(Resent { bytes: out.len() - before, timed_out })
-    }
-
-    /// Whether answers that were given up are likely to come.
-    const fn awaits_late(&self) -> bool {
-        self.answers_late && self.unanswered_if_late < self.unanswered
     }
 
     fn transmitted(&mut self, sequence: u64, sent_s: Option<f64>) {
@@ -383,24 +373,19 @@ impl Window {
         if number > self.last_answer {
             // A board that already had some of what was sent again answers the first of it with a number far ahead,
             // and so does one whose answers were lost on the way; the former leaves more answers to come.
-            let is_again = number <= self.resent_below;
-            if is_again {
-                self.unanswered = self.place_of(self.last_answer, self.unanswered) + 1;
-                self.unanswered_if_late = self.place_of(self.last_answer, self.unanswered_if_late) + 1;
-            } else {
-                self.settle(self.place_of(number - 1, self.unanswered));
-            }
+            let answered = if number <= self.resent_below { self.last_answer } else { number - 1 };
+            self.unanswered = self.place_of(answered) + 1;
             self.last_answer = number;
             return;
         }
         let Some(front) = self.sent.front() else { return };
+        let place = self.unanswered;
+        self.unanswered = (place + 1).min(self.transmissions);
         let age_s = now_s - front.last_s;
-        let is_late = self.awaits_late() || age_s < self.round_trip.usual_answer_s_min();
-        let place = if is_late { self.unanswered_if_late } else { self.unanswered };
-        self.unanswered = (self.unanswered + 1).min(self.transmissions);
-        self.unanswered_if_late = (self.unanswered_if_late + 1).min(self.unanswered);
+        let is_late = self.late_answers > 0 && age_s < self.round_trip.usual_answer_s_min();
+        self.late_answers = if is_late { self.late_answers - 1 } else { 0 };
         let answers_front =
-            place >= self.latest(self.expected).place && age_s >= self.round_trip.answer_s_min();
+            place >= self.latest(self.expected).place && age_s >= self.round_trip.answer_s_min() && !is_late;
         if answers_front {
             self.send_again = true;
         } else {
@@ -408,26 +393,15 @@ impl Window {
         }
     }
 
-    /// The answer to the transmission at this place has come. What was sent but once is answered behind all that was sent
-    /// before it, so nothing is late any more; and it tells which of the counts was right.
-    const fn settle(&mut self, place: u64) {
-        let (given_up, late) = (place.abs_diff(self.unanswered), place.abs_diff(self.unanswered_if_late));
-        if given_up != late {
-            self.answers_late = late < given_up;
-        }
-        self.unanswered = place + 1;
-        self.unanswered_if_late = place + 1;
-    }
-
     /// The place of the transmission of a block that an answer to it most likely belongs to: the one that is nearest
     /// to where the count of answers stands. Noise makes the board answer too often, and answers get lost; this
     /// brings the count back into step.
-    fn place_of(&self, sequence: u64, unanswered: u64) -> u64 {
+    fn place_of(&self, sequence: u64) -> u64 {
         let remembered =
             self.transmissions.saturating_sub(TRANSMISSIONS_REMEMBERED as u64)..self.transmissions;
         remembered
             .filter(|&place| self.log[place as usize % TRANSMISSIONS_REMEMBERED] == sequence)
-            .min_by_key(|&place| place.abs_diff(unanswered))
+            .min_by_key(|&place| place.abs_diff(self.unanswered))
             .unwrap_or_else(|| self.latest(sequence).place)
     }
 }
