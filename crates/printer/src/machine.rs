@@ -195,7 +195,11 @@ pub fn step_generator(
     clock: Hertz,
     max_error: Seconds,
 ) -> Result<StepGenerator<Geometry>, PrinterError> {
-    let specs = step_distances(config).map(|step_distance| StepperSpec { step_distance, max_error });
+    let specs = step_distances(config).map(|step_distance| StepperSpec {
+        step_distance,
+        max_error,
+        search: config.printer.step_search,
+    });
     StepGenerator::new(clock, &specs, geometry(config))
         .map_err(|error| PrinterError::new(ErrorCode::ConfigInvalid, error.to_string()))
 }

@@ -81,6 +81,9 @@ pub(crate) struct PlanArgs {
     /// How early or late a step may come, in µs (and never more than a quarter of the gap to its neighbours); 25 is usual
     #[arg(long, value_name = "US", value_parser = step_error)]
     pub(crate) step_error_us: Option<f64>,
+    /// How step commands are searched for, instead of as the machine file says
+    #[arg(long, value_name = "SEARCH", value_enum)]
+    pub(crate) step_search: Option<Search>,
     /// With `--json`: say what each layer takes, too
     #[arg(long, requires = "json")]
     pub(crate) layers: bool,
@@ -118,6 +121,15 @@ pub(crate) enum Profile {
     Torque,
     /// With a limited jerk
     Jerk,
+}
+
+/// How step commands are searched for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Search {
+    /// Each by itself
+    Usual,
+    /// With a look at the next one: fewer bytes for more work
+    Ahead,
 }
 
 /// The board that is simulated.

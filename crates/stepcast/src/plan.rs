@@ -15,10 +15,11 @@ use printer::{
     planner::{LayerTotal, PlanOptions, PlanReport, PlanStream, Ramps, Total},
 };
 use serde::Serialize;
+use steps::StepSearch;
 use units::{MmPerS3, Seconds};
 
 use crate::{
-    cli::{PlanArgs, Profile},
+    cli::{PlanArgs, Profile, Search},
     config_file,
     console::{self, Progress},
     input::Input,
@@ -123,6 +124,10 @@ pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
             Profile::Jerk => Ramps::Jerk(args.max_jerk.map(MmPerS3)),
         }),
         step_error: args.step_error_us.map(|error_us| Seconds(error_us * 1e-6)),
+        step_search: args.step_search.map(|search| match search {
+            Search::Usual => StepSearch::Usual,
+            Search::Ahead => StepSearch::Ahead,
+        }),
         trace: args.trace.is_some().then_some(Seconds(args.trace_step_ms * 1e-3)),
     };
     let mut trace = TraceFile::create(args.trace.as_deref())?;

@@ -130,6 +130,9 @@ fn plan_counts_steps_and_bytes_and_writes_the_stream() {
     assert_eq!(stream.last(), Some(&0x7e));
     stepcast(&arguments);
     assert_eq!(fs::read(&dump).unwrap(), stream, "the same plan twice");
+    let ahead = json(&stepcast(&[&arguments[..5], &["--step-search", "ahead"]].concat()));
+    assert_eq!(ahead["motors"]["stepper_x"]["steps"], report["motors"]["stepper_x"]["steps"]);
+    assert!(ahead["bytes"].as_u64() < report["bytes"].as_u64(), "a look ahead saves bytes");
 }
 
 #[test]

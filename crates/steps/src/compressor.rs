@@ -4,14 +4,17 @@
 //! nearer to each other than half their true gap. Every clock is integer arithmetic from the clock before, and every
 //! window lies around the true time: errors never add up.
 //!
-//! Each command is as long as any: it goes on until no interval and `add` pass the next window too.
+//! Each command goes on until no interval and `add` pass the next window too, or a few steps less where that leaves the next one
+//! a better start (`ahead`).
 //!
 //! Whether a command is closed depends on the step times alone, never on when they become known: a later step either
 //! closes it by its distance or could have gone on with it. Only where another motor's pieces run out of room is one
 //! closed early, after a number of moves that is always the same.
 
+use crate::ahead::{AHEAD_STEPS_MAX, Ahead, usual_end};
 use crate::crossing::Piece;
-use crate::stabbing::{FIT_STEPS_MAX, Stabbing, larger, smaller};
+use crate::spec::StepSearch;
+use crate::stabbing::{FIT_STEPS_MAX, Fit, Stabbing, larger, smaller};
 use crate::windows::{Steps, append_errors, longest_gap, shortest_gap};
 use crate::{IDLE_TICKS_MAX, StepCommand, StepCommandKind};
 use std::collections::VecDeque;
@@ -22,7 +25,7 @@ pub(crate) const TURN_STEPS: u32 = 128;
 /// Where those cannot be taken together, so many are.
 const PART_STEPS: usize = 16;
 /// The most steps of one motor that wait for their command to be closed.
-pub const STEPS_BUFFERED_MAX: usize = (FIT_STEPS_MAX + TURN_STEPS) as usize + 2;
+pub const STEPS_BUFFERED_MAX: usize = (AHEAD_STEPS_MAX + FIT_STEPS_MAX + TURN_STEPS) as usize + 2;
 /// A step is given out once the plan is known this far beyond it.
 pub const STEP_HOLD_MAX: Seconds = Seconds(0.1);
 /// The longest time from the first to the last step of a command.
@@ -65,6 +68,10 @@ pub(crate) struct Compressor {
     /// Direction that the motor has been told in this run.
     told: Option<bool>,
     stabbing: Stabbing,
+    /// The command that it found, once it is known how that ends.
+    chosen: Option<Fit>,
+    /// Where the next command is looked at for that.
+    ahead: Option<Box<Ahead>>,
     /// Closed commands, each with the true time of its first step (for SetDir: of the step after it).
     out: VecDeque<(f64, StepCommand)>,
     pub(crate) tally: Tally,
@@ -88,7 +95,7 @@ pub(crate) fn gap_min_ticks(ticks_per_s: f64) -> f64 {
 }
 
 impl Compressor {
-    pub(crate) fn new(motor: usize, ticks_per_s: f64, max_error: Seconds) -> Self {
+    pub(crate) fn new(motor: usize, ticks_per_s: f64, max_error: Seconds, search: StepSearch) -> Self {
         Self {
             motor,
             max_error: max_error.0 * ticks_per_s * WINDOW_SHARE,
@@ -105,6 +112,8 @@ impl Compressor {
             forward: true,
             told: None,
             stabbing: Stabbing::new(),
+            chosen: None,
+            ahead: (search == StepSearch::Ahead).then(|| Box::new(Ahead::new())),
             out: VecDeque::new(),
             tally: Tally {
                 steps: 0,
@@ -124,6 +133,7 @@ impl Compressor {
         self.forget();
         self.told = None;
         self.stabbing = Stabbing::new();
+        self.ahead = self.ahead.take().map(|_| Box::new(Ahead::new()));
         self.out.clear();
     }
 
@@ -231,10 +241,25 @@ impl Compressor {
         self.fit_in();
         // None is left where the last one came after a long rest.
         let first = self.times.get(self.first).copied().unwrap_or(time);
-        if gap > self.hold_max || time - first > self.span_max {
+        if gap > self.hold_max {
             self.emit_all();
+        } else if time - first > self.span_max {
+            self.relieve(time);
         }
         self.times.push(time);
+    }
+
+    /// Gives out what a step at `time` is too far from.
+    fn relieve(&mut self, time: f64) {
+        while self.stabbing.is_closed() {
+            // It need not wait for a look ahead.
+            self.emit();
+            self.fit_in();
+            if self.times.get(self.first).is_none_or(|first| time - first <= self.span_max) {
+                return;
+            }
+        }
+        self.emit_all();
     }
 
     /// A step after which nothing was known: after a rest, or at the very start of a run.
@@ -267,6 +292,10 @@ impl Compressor {
         }
         self.errors.pop();
         self.stabbing.clear();
+        self.chosen = None;
+        if let Some(ahead) = &mut self.ahead {
+            ahead.clear();
+        }
         self.fit_in();
         let before = self.times[self.first..].iter().rev().nth(1).copied();
         if let Some(last) = self.times[self.first..].last() {
@@ -329,7 +358,7 @@ impl Compressor {
         while self.known() > 0 {
             if self.is_after_rest() {
                 self.emit_after_rest();
-            } else if self.extend() {
+            } else if self.extend() && self.choose(false) {
                 self.emit();
             } else {
                 return;
@@ -352,6 +381,18 @@ impl Compressor {
         true
     }
 
+    /// Decides how the command that was found ends; `false` while too few steps are known. Where `ends`, no more follow.
+    fn choose(&mut self, ends: bool) -> bool {
+        let steps = steps_from(self.base_ticks, &self.times, &self.errors, self.first);
+        self.chosen = match &mut self.ahead {
+            Some(ahead) if (1..=AHEAD_STEPS_MAX).contains(&self.stabbing.passed()) => {
+                ahead.choose(&self.stabbing, &steps, ends)
+            }
+            _ => usual_end(&self.stabbing, &steps, ends),
+        };
+        self.chosen.is_some()
+    }
+
     /// Gives out all steps; the window of the last is known.
     fn emit_all(&mut self) {
         loop {
@@ -359,6 +400,7 @@ impl Compressor {
             if !self.fit_rest() {
                 return self.forget();
             }
+            self.choose(true);
             self.emit();
         }
     }
@@ -367,13 +409,20 @@ impl Compressor {
     fn emit(&mut self) {
         let mut record = self.tally.error_max;
         let steps = steps_from(self.base_ticks, &self.times, &self.errors, self.first);
-        let fit = self.stabbing.fit(&steps, self.max_error, &mut record);
-        let (interval, add, count) = (f64::from(fit.interval), f64::from(fit.add), f64::from(fit.count));
+        let chosen = self.chosen.take();
+        let fit = chosen.unwrap_or_else(|| self.stabbing.fit(&steps));
+        self.stabbing.note(&fit, &steps, self.max_error, &mut record);
         // Floats hold these integers exactly.
-        let clock = self.base_ticks + count * (interval + 0.5 * add * (count - 1.0));
+        let clock = self.base_ticks + fit.end();
         let kind =
             StepCommandKind::QueueStep { interval: fit.interval, count: fit.count as u16, add: fit.add };
         self.put(kind, clock as u64, fit.count as usize, record);
+        if let Some(ahead) = &mut self.ahead {
+            match chosen {
+                Some(_) => ahead.go_on(&mut self.stabbing),
+                None => ahead.clear(),
+            }
+        }
     }
 
     /// Whether the board's 32-bit clock cannot express how far the next step is.
@@ -425,38 +474,5 @@ fn steps_from<'a>(base: f64, times: &'a [f64], errors: &'a [f64], first: usize) 
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Segment;
-    use crate::crossing::Grid;
-
-    #[test]
-    fn steps_taken_together_are_packed_as_one_by_one() {
-        // From 3000 steps a second down to one in 140 ms, in turns that are quick, too long for a command, and held back.
-        let grid = Grid { steps_per_mm: 100.0, ticks_per_s: 12e6 };
-        let (mut together, mut alone) =
-            (Compressor::new(0, 12e6, Seconds(25e-6)), Compressor::new(0, 12e6, Seconds(25e-6)));
-        let (mut start_time, mut start, mut count) = (1.0, 0.0, 0);
-        for velocity in [30.0, 10.0, 5.0, 2.5, 1.0, 0.5, 0.07_f64, 4.0] {
-            let powers = [velocity, -0.02 * velocity, 0.0, 0.0, 0.0];
-            let mut segment = Segment { start_time, duration: 2.0, start, end: 0.0, powers };
-            segment.end = start + segment.way(2.0);
-            (start_time, start) = (start_time + 2.0, segment.end);
-            grid.split(&segment, &mut count, &mut |mut piece| {
-                let mut times = Vec::new();
-                let mut copy = piece;
-                copy.append_times(piece.steps as u32, &mut times);
-                for time in times {
-                    alone.step(time, copy.forward);
-                }
-                while piece.steps > 0 {
-                    together.take_from(&mut piece);
-                }
-            });
-        }
-        together.end();
-        alone.end();
-        assert!(together.out.len() > 20 && together.tally.steps == count as u64);
-        assert_eq!(together.out, alone.out);
-    }
-}
+#[path = "compressor_tests.rs"]
+mod tests;

@@ -129,7 +129,7 @@ impl<K: Kinematics> StepGenerator<K> {
                 position: 0.0,
                 count: 0,
                 pieces: VecDeque::new(),
-                compressor: Compressor::new(motor, ticks_per_s, spec.max_error),
+                compressor: Compressor::new(motor, ticks_per_s, spec.max_error, spec.search),
                 known: 0.0,
                 generated: 0.0,
             });

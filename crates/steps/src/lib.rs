@@ -14,6 +14,7 @@
 //! them) → `stabbing` (the longest quadratic with whole coefficients through the windows).
 
 mod advance;
+mod ahead;
 mod bent;
 mod compressor;
 mod crossing;
@@ -36,7 +37,7 @@ pub use generator::{Filters, PIECES_HELD_MAX, PIECES_MAX, SMOOTH_TIME_MAX, StepG
 pub use kinematics::{AXES, Cartesian, Delta, Geometry, Kinematics, Linear, STRETCH_RATIO_MAX, Tower};
 pub use segment::{DEGREE_MAX, Segment};
 pub use shaper::{DAMPING_RATIOS, SHAPER_FREQUENCIES, Shaper, ShaperKind};
-pub use spec::{MotorStats, PushError, SpecError, StepperSpec};
+pub use spec::{MotorStats, PushError, SpecError, StepSearch, StepperSpec};
 
 use units::{Hertz, Ticks};
 

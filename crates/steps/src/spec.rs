@@ -13,6 +13,18 @@ pub struct StepperSpec {
     pub step_distance: Mm,
     /// How early or late a step may come; never more than a quarter of the gap to either neighbour.
     pub max_error: Seconds,
+    /// What is done for fewer bytes.
+    pub search: StepSearch,
+}
+
+/// How commands are searched for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StepSearch {
+    /// Each by itself, as long as any.
+    #[default]
+    Usual,
+    /// With a look at the next one: fewer bytes, for several times the search.
+    Ahead,
 }
 
 impl StepperSpec {
@@ -21,7 +33,7 @@ impl StepperSpec {
 
     /// A motor with the usual allowance.
     pub const fn new(step_distance: Mm) -> Self {
-        Self { step_distance, max_error: Self::MAX_ERROR }
+        Self { step_distance, max_error: Self::MAX_ERROR, search: StepSearch::Usual }
     }
 }
 

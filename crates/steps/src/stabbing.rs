@@ -35,6 +35,25 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
+    /// Bytes on the wire.
+    pub(crate) fn bytes(&self) -> u32 {
+        let value = |value: i32| match value {
+            -32..=95 => 1,
+            -4096..=12_287 => 2,
+            -524_288..=1_572_863 => 3,
+            -67_108_864..=201_326_591 => 4,
+            _ => 5,
+        };
+        // The message, the motor, and three values.
+        2 + value(self.interval as i32) + value(self.count as i32) + value(i32::from(self.add))
+    }
+
+    /// When the last step comes, in ticks after the step before the command. Exact.
+    pub(crate) fn end(&self) -> f64 {
+        let count = f64::from(self.count);
+        count * (f64::from(self.interval) + 0.5 * f64::from(self.add) * (count - 1.0))
+    }
+
     /// Of the candidate's intervals the one with which the last step comes nearest to `aim`, in ticks after the step before
     /// the command: what follows starts there.
     fn new(candidate: &Candidate, count: u32, aim: f64) -> Self {
@@ -100,6 +119,10 @@ pub(crate) struct Stabbing {
     most: f64,
     /// What has passed the most slits.
     best: Candidate,
+    /// Why that could not go on, where it could not.
+    best_block: Option<Block>,
+    /// Nothing can be longer than the best.
+    is_closed: bool,
 }
 
 impl Stabbing {
@@ -113,6 +136,8 @@ impl Stabbing {
             least: ADD_MIN,
             most: ADD_MAX,
             best: Candidate::new(0.0),
+            best_block: None,
+            is_closed: false,
         }
     }
 
@@ -121,36 +146,126 @@ impl Stabbing {
         self.tries = 0;
         self.is_blocked = true;
         (self.least, self.most, self.best) = (ADD_MIN, ADD_MAX, Candidate::new(0.0));
+        (self.best_block, self.is_closed) = (None, false);
     }
 
     /// Whether the windows of `steps` are enough to know the longest command. They are those known so far, from the first step
     /// of the command on.
     pub(crate) fn extend(&mut self, steps: &Steps<'_>) -> bool {
-        self.search(steps, false)
+        self.is_closed = self.is_closed || self.search(steps, false);
+        self.is_closed
     }
 
     /// The longest command for `steps` and none beyond them; at least one.
     pub(crate) fn finish(&mut self, steps: &Steps<'_>) {
-        if !self.search(steps, true) {
-            self.keep();
+        if !self.is_closed && !self.search(steps, true) {
+            self.keep(None);
         }
+        self.is_closed = true;
     }
 
-    /// The command found. Its last step comes as near as may be to when it is due. The farthest that a step is off goes into `record`:
-    /// no window is wider than `most`, and what has come within a tick of that is `most`, whatever follows.
-    pub(crate) fn fit(&mut self, steps: &Steps<'_>, most: f64, record: &mut f64) -> Fit {
+    /// The command found. Its last step comes as near as may be to when it is due.
+    pub(crate) fn fit(&self, steps: &Steps<'_>) -> Fit {
         // A window without a whole tick in it is served as near as can be.
         let count = self.best.passed.max(1);
-        self.seed = (count as usize * 3 / 4).clamp(SEED_MIN, SEED_MAX);
-        let steps = steps.first(count as usize);
-        let fit = Fit::new(&self.best, count, steps.times[count as usize - 1] - steps.base);
+        Fit::new(&self.best, count, steps.times[count as usize - 1] - steps.base)
+    }
+
+    /// The farthest that a step of `fit` is off goes into `record`: no window is wider than `most`, and what has come within a
+    /// tick of that is `most`, whatever follows.
+    pub(crate) fn note(&mut self, fit: &Fit, steps: &Steps<'_>, most: f64, record: &mut f64) {
+        self.expect(fit.count);
         if *record < most || self.best.passed == 0 {
+            let steps = steps.first(fit.count as usize);
             *record = larger(*record, steps.worst(f64::from(fit.interval), f64::from(fit.add)));
             if *record > most - 1.0 {
                 *record = larger(*record, most);
             }
         }
-        fit
+    }
+
+    /// The next command may be about as long as one of `count` steps.
+    pub(crate) fn expect(&mut self, count: u32) {
+        self.seed = (count as usize * 3 / 4).clamp(SEED_MIN, SEED_MAX);
+    }
+
+    /// Whether nothing has been searched yet.
+    pub(crate) const fn is_fresh(&self) -> bool {
+        self.tries == 0
+    }
+
+    /// Whether nothing can be longer than the command found.
+    pub(crate) const fn is_closed(&self) -> bool {
+        self.is_closed
+    }
+
+    /// Steps of the command found; none where the first window holds no whole tick.
+    pub(crate) const fn passed(&self) -> u32 {
+        self.best.passed
+    }
+
+    /// The `add` of the command found.
+    pub(crate) fn add(&self) -> i16 {
+        self.best.add as i16
+    }
+
+    /// Why the command found could not go on.
+    pub(crate) const fn block(&self) -> Option<Block> {
+        self.best_block
+    }
+
+    /// How much later the last step of the command found could be than its earliest, in ticks, with the same `add`.
+    pub(crate) fn play(&self) -> f64 {
+        (self.best.high - self.best.low) * f64::from(self.best.passed)
+    }
+
+    /// A command for the first `count` steps, which are no more than found, whose last step comes as late, or else as early, as
+    /// few values of `add` allow, from `add` on, which passes them; none of them takes more bytes than the one found.
+    pub(crate) fn bent(&self, count: u32, add: i16, is_late: bool, tries: u32) -> Fit {
+        let sign = if is_late { 1.0 } else { -1.0 };
+        let fit = |at: &Candidate| Fit {
+            interval: if is_late { floor(at.high) } else { ceil(at.low) } as u32,
+            add: if count == 1 { 0 } else { at.add as i16 },
+            count,
+        };
+        let from = if count == 1 { self.best.add } else { f64::from(add) };
+        let mut at = self.best;
+        if count < at.passed || from != at.add {
+            at = Candidate::new(from);
+            self.slits.pass_to(&mut at, count as usize);
+        }
+        let mut best = fit(&at);
+        let class = [ADD_SHORT, ADD_TWO_BYTES].into_iter().find(|class| from >= class.0 && from <= class.1);
+        let class = class.unwrap_or((ADD_MIN, ADD_MAX));
+        // How far `add` may and may not go.
+        let mut good = 0.0;
+        let mut bad = 1.0 + if is_late { class.1 - from } else { from - class.0 };
+        let mut next = 1.0;
+        for _ in 0..if count == 1 { 0 } else { tries } {
+            if next >= bad {
+                next = floor(0.5 * (good + bad)) as f64;
+            }
+            if next <= good {
+                break;
+            }
+            at = Candidate::new(from + sign * next);
+            if let Some(block) = self.slits.pass_to(&mut at, count as usize) {
+                bad = next;
+                if at.passed > 0 && (block == Block::Below) == is_late {
+                    let most = floor(sign * (self.slits.bound(&at, block) - from)) as f64;
+                    bad = smaller(bad, most + 1.0);
+                }
+                next = bad - 1.0;
+                continue;
+            }
+            let other = fit(&at);
+            if (other.end() - best.end()) * sign > 0.0 {
+                best = other;
+            }
+            good = next;
+            next *= 4.0;
+        }
+        best
     }
 
     /// Tries values as far as the windows are known; whether nothing can be longer than the best. Where `ends`, nothing comes
@@ -173,12 +288,12 @@ impl Stabbing {
             let block = self.slits.pass(&mut self.tried);
             let passed = self.tried.passed as usize;
             if let Some(block) = block {
-                self.keep();
+                self.keep(Some(block));
                 if !self.narrow(block) {
                     return true;
                 }
             } else if passed == FIT_STEPS_MAX as usize {
-                self.keep();
+                self.keep(None);
                 return true;
             } else if passed == known {
                 return false;
@@ -222,12 +337,12 @@ impl Stabbing {
     }
 
     /// The value in hand, if it is better than the best so far.
-    fn keep(&mut self) {
+    fn keep(&mut self, block: Option<Block>) {
         let is_short = |candidate: &Candidate| candidate.add >= ADD_SHORT.0 && candidate.add <= ADD_SHORT.1;
         let is_shorter =
             self.tried.passed == self.best.passed && is_short(&self.tried) && !is_short(&self.best);
         if self.tried.passed > self.best.passed || is_shorter {
-            self.best = self.tried;
+            (self.best, self.best_block) = (self.tried, block);
         }
     }
 
@@ -304,7 +419,8 @@ mod tests {
                 candidate.passed
             };
             let mut record = 0.0;
-            let fit = stabbing.fit(&steps, 1e3, &mut record);
+            let fit = stabbing.fit(&steps);
+            stabbing.note(&fit, &steps, 1e3, &mut record);
             prop_assert_eq!(fit.count, (-1000..1000).map(reach).max().unwrap_or(0));
             prop_assert!(record <= error && is_closed <= (fit.count < 30));
         }

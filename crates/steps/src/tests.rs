@@ -2,7 +2,7 @@
 
 use crate::{
     Cartesian, IDLE_TICKS_MAX, MotorStats, PushError, RUN_SPAN_MAX, STEP_HOLD_MAX, SpecError, StepCommand,
-    StepCommandKind, StepGenerator, StepperSpec,
+    StepCommandKind, StepGenerator, StepSearch, StepperSpec,
 };
 use motion::{ExtruderLimits, Limits, LookAhead, MoveRequest, PlannedMove};
 use proptest::prelude::*;
@@ -27,7 +27,11 @@ pub(crate) fn limits() -> Limits {
 }
 
 pub(crate) fn generator(clock: Hertz) -> StepGenerator {
-    let specs = STEP_DISTANCES.map(|distance| StepperSpec::new(Mm(distance)));
+    searching(clock, StepSearch::Usual)
+}
+
+fn searching(clock: Hertz, search: StepSearch) -> StepGenerator {
+    let specs = STEP_DISTANCES.map(|distance| StepperSpec { search, ..StepperSpec::new(Mm(distance)) });
     StepGenerator::new(clock, &specs, Cartesian).unwrap()
 }
 
@@ -180,15 +184,23 @@ pub(crate) fn any_points() -> impl Strategy<Value = Vec<([f64; 4], f64)>> {
     })
 }
 
+fn any_search() -> impl Strategy<Value = StepSearch> {
+    prop_oneof![Just(StepSearch::Usual), Just(StepSearch::Ahead)]
+}
+
 pub(crate) const START: [f64; 4] = [100.0, 50.003, 0.2, 1234.5];
 
 proptest! {
     #[test]
-    fn every_step_comes_when_it_is_due(points in any_points(), mhz in prop_oneof![Just(12), Just(72), Just(180), Just(1)]) {
+    fn every_step_comes_when_it_is_due(
+        points in any_points(),
+        mhz in prop_oneof![Just(12), Just(72), Just(180), Just(1)],
+        search in any_search(),
+    ) {
         let clock = Hertz(mhz * 1_000_000);
         let planned = plan(START, &points);
         prop_assume!(!planned.is_empty());
-        let mut generator = generator(clock);
+        let mut generator = searching(clock, search);
         let commands = commands(&mut generator, &planned, false);
         if mhz > 1 {
             check(&planned, &commands, clock);
@@ -209,9 +221,9 @@ proptest! {
     }
 
     #[test]
-    fn when_commands_are_taken_does_not_change_them(points in any_points()) {
+    fn when_commands_are_taken_does_not_change_them(points in any_points(), search in any_search()) {
         let planned = plan(START, &points);
-        let mut generator = generator(CLOCK);
+        let mut generator = searching(CLOCK, search);
         let late = commands(&mut generator, &planned, false);
         let early = commands(&mut generator, &planned, true);
         for motor in 0..4 {
@@ -305,6 +317,32 @@ fn steady_motion_packs_thousands_of_steps_a_second_into_a_few_commands() {
     assert!(queue_steps < 30, "{queue_steps} commands");
     assert!((peak_steps_per_s - 8000.0).abs() < 1.0, "{peak_steps_per_s}");
     assert!(max_error.0 <= 25e-6, "{max_error}");
+}
+
+#[test]
+fn looking_ahead_saves_bytes() {
+    // A ring of short lines at an even speed, as curves are sliced.
+    let points: Vec<_> = (1..400)
+        .map(|i| {
+            let (sin, cos) = libm::sincos(f64::from(i) * 0.03);
+            ([30.0 * cos, 30.0 * sin, 0.2, f64::from(i) * 0.03], 60.0)
+        })
+        .collect();
+    let planned = plan([30.0, 0.0, 0.2, 0.0], &points);
+    let bytes = |search: StepSearch| {
+        let all = commands(&mut searching(CLOCK, search), &planned, false);
+        check(&planned, &all, CLOCK);
+        all.iter()
+            .map(|command| match command.kind {
+                StepCommandKind::SetDir { .. } => 3,
+                StepCommandKind::QueueStep { interval, count, add } => {
+                    crate::stabbing::Fit { interval, add, count: u32::from(count) }.bytes()
+                }
+            })
+            .sum::<u32>()
+    };
+    let (usual, ahead) = (bytes(StepSearch::Usual), bytes(StepSearch::Ahead));
+    assert!(f64::from(ahead) < 0.985 * f64::from(usual), "{ahead} bytes instead of {usual}");
 }
 
 #[test]
@@ -422,8 +460,8 @@ fn a_fast_straight_line_of_tiny_pieces_flows_however_it_is_taken() {
     }
     look_ahead.flush();
     planned.extend(std::iter::from_fn(|| look_ahead.pop()));
-    let taken = |every: usize| {
-        let mut generator = generator(CLOCK);
+    let taken = |every: usize, search: StepSearch| {
+        let mut generator = searching(CLOCK, search);
         generator.begin_run([0.0; 4]).unwrap();
         let mut out = Vec::new();
         for (index, one) in planned.iter().enumerate() {
@@ -439,8 +477,10 @@ fn a_fast_straight_line_of_tiny_pieces_flows_however_it_is_taken() {
         out.extend(std::iter::from_fn(|| generator.pop()));
         out
     };
-    let out = taken(1);
-    check(&planned, &out, CLOCK);
-    assert_eq!(taken(100), out);
-    assert_eq!(taken(usize::MAX), out);
+    for search in [StepSearch::Usual, StepSearch::Ahead] {
+        let out = taken(1, search);
+        check(&planned, &out, CLOCK);
+        assert_eq!(taken(100, search), out);
+        assert_eq!(taken(usize::MAX, search), out);
+    }
 }

@@ -45,6 +45,11 @@ impl Steps<'_> {
         Self { times: &self.times[..count], errors: &self.errors[..count], ..*self }
     }
 
+    /// Those from number `count` on, where the last before them comes `end` ticks after the one before the first.
+    pub(crate) fn after(&self, count: usize, end: f64) -> Self {
+        Self { base: self.base + end, times: &self.times[count..], errors: &self.errors[count..] }
+    }
+
     /// How far the farthest of them is from its time with this `interval` and `add`. Whole numbers and halves: exact in any
     /// order.
     pub(crate) fn worst(&self, interval: f64, add: f64) -> f64 {
@@ -113,11 +118,24 @@ impl Slits {
     }
 
     /// Goes on from the last slit that the candidate has passed until it has no whole interval left, or no slits are left.
-    #[inline]
+    #[allow(clippy::inline_always)] // The search lives in these loops.
+    #[inline(always)]
     pub(crate) fn pass(&self, candidate: &mut Candidate) -> Option<Block> {
+        self.go_on(candidate, self.count)
+    }
+
+    /// The same with the first `count` slits alone.
+    #[inline(never)]
+    pub(crate) fn pass_to(&self, candidate: &mut Candidate, count: usize) -> Option<Block> {
+        self.go_on(candidate, count)
+    }
+
+    #[allow(clippy::inline_always)] // The search lives in these loops.
+    #[inline(always)]
+    fn go_on(&self, candidate: &mut Candidate, count: usize) -> Option<Block> {
         let half = 0.5 * candidate.add;
         let first = candidate.passed as usize;
-        let (lows, highs) = (&self.lows[first..self.count], &self.highs[first..self.count]);
+        let (lows, highs) = (&self.lows[first..count], &self.highs[first..count]);
         let from = f64::from(candidate.passed);
         let mut rises = NUMBERS.map(|number| half * (number + from));
         let mut at = *candidate;
@@ -149,7 +167,8 @@ impl Slits {
     }
 
     /// Which `add` a candidate that is blocked would have to have, at least or at most.
-    #[inline]
+    #[allow(clippy::inline_always)] // The search lives in these loops.
+    #[inline(always)]
     pub(crate) fn bound(&self, candidate: &Candidate, block: Block) -> f64 {
         let half = 0.5 * candidate.add;
         let at = candidate.passed as usize;

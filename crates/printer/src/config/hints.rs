@@ -19,6 +19,7 @@ pub(super) fn hint(key: &str) -> &'static str {
         "max_x_accel" | "max_y_accel" => "the acceleration of that axis in mm/s², e.g. 2000",
         "junction_deviation" => "the distance in mm by which a corner may be missed, e.g. 0.013",
         "max_jerk" => "the fastest change of the acceleration in mm/s³, e.g. 100000",
+        "step_search" => "`usual`, or `ahead` for fewer bytes at more work of the host",
         "unreachable_speed" => "`clamp` to slow such moves down, or `reject` to refuse them",
         "pull_out_torque" | "slowing_torque" => {
             "the motor's torque in N·m at rates in full steps/s, e.g. 0: 2.2, 500: 2.0, 2000: 0.6"

@@ -1,5 +1,6 @@
 //! `[mcu]`, `[printer]` and the small sections about the machine as a whole.
 
+use steps::StepSearch;
 use units::{Mm, MmPerS, MmPerS2, MmPerS3, Seconds};
 
 use super::Builder;
@@ -60,6 +61,8 @@ pub struct MachineConfig {
     pub unreachable_speed: UnreachableSpeed,
     /// The fastest that the acceleration along the path may change (an option of our own); not limited where not given.
     pub max_jerk: Option<MmPerS3>,
+    /// How step commands are searched for (an option of our own).
+    pub step_search: StepSearch,
 }
 
 /// `[idle_timeout]`.
@@ -160,6 +163,14 @@ pub(super) fn printer(
             Err(reader.error("unreachable_speed", problem))
         }
     };
+    let step_search = match reader.text("step_search").as_deref() {
+        None | Some("usual") => Ok(StepSearch::Usual),
+        Some("ahead") => Ok(StepSearch::Ahead),
+        Some(other) => {
+            let problem = format!("`{}` is neither `usual` nor `ahead`", excerpt(other));
+            Err(reader.error("step_search", problem))
+        }
+    };
     reader.finish();
     let [max_x_velocity, max_y_velocity] = xy_velocity;
     let [max_x_accel, max_y_accel] = xy_accel;
@@ -182,6 +193,7 @@ pub(super) fn printer(
         junction_deviation: junction_deviation?.map(Mm),
         unreachable_speed: unreachable_speed?,
         max_jerk: max_jerk?.map(MmPerS3),
+        step_search: step_search?,
     };
     Ok((config, delta.transpose()?))
 }
@@ -217,4 +229,25 @@ pub(super) fn force_move(builder: &mut Builder<'_>) -> Checked<bool> {
     let enabled = reader.boolean_or("enable_force_move", false);
     reader.finish();
     enabled
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{assert_diagnosed, with};
+    use super::super::{Severity, parse};
+    use super::*;
+
+    #[test]
+    fn step_search_is_one_of_two_words() {
+        let search = |line: &str| {
+            let (config, diagnostics) = parse(&with("kinematics: cartesian", line));
+            assert!(diagnostics.is_empty(), "{diagnostics:#?}");
+            config.unwrap().printer.step_search
+        };
+        assert_eq!(search("kinematics: cartesian"), StepSearch::Usual);
+        assert_eq!(search("kinematics: cartesian\nstep_search: usual"), StepSearch::Usual);
+        assert_eq!(search("kinematics: cartesian\nstep_search: ahead"), StepSearch::Ahead);
+        let wrong = with("kinematics: cartesian", "kinematics: cartesian\nstep_search: far");
+        assert_diagnosed(&wrong, Severity::Error, "step_search: far", "neither `usual` nor `ahead`");
+    }
 }

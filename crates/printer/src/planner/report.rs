@@ -2,7 +2,7 @@
 
 use gcode::{Diagnostic, LineNumber, Severity};
 use motion::PlannedMove;
-use steps::{StepCommand, StepCommandKind};
+use steps::{StepCommand, StepCommandKind, StepSearch};
 use units::{Hertz, MmPerS3, Seconds};
 use wire::{
     Command,
@@ -90,6 +90,8 @@ pub struct PlanOptions {
     pub ramps: Option<Ramps>,
     /// How early or late a step may come, where not as usual ([`machine::STEP_ERROR_MAX`]); 1 ms at most.
     pub step_error: Option<Seconds>,
+    /// How step commands are searched for, where not as the machine file says.
+    pub step_search: Option<StepSearch>,
     /// How far apart the axes' paths are sampled, where they are; above 0.
     pub trace: Option<Seconds>,
 }
@@ -137,6 +139,7 @@ impl Default for PlanOptions {
             minimum_cruise_ratio: None,
             ramps: None,
             step_error: None,
+            step_search: None,
             trace: None,
         }
     }
@@ -174,6 +177,9 @@ impl PlanStream {
         }
         if let Some(ramps) = options.ramps {
             ramps.apply(&mut config)?;
+        }
+        if let Some(search) = options.step_search {
+            config.printer.step_search = search;
         }
         let config = &config;
         let mut planner = Planner::new(config, PLAN_CLOCK)?;
