@@ -57,6 +57,13 @@ export interface FrameReport {
 const REST_MS = 140;
 /** The same after more of a file has come. */
 const GROWTH_REST_MS = 1500;
+/** While a file comes, the picture follows this often: first soon, then not so often that drawing delays the reading. */
+const GROWTH_MS: Ms = 150;
+const GROWTH_MAX_MS: Ms = 1000;
+const GROWTH_SLOWER = 1.5;
+/** Where pictures are drawn by the processor, they take it from the reading: a pause is so many times as long as a picture. */
+const GROWTH_PAUSE = 8;
+const GROWTH_PAUSE_MAX_MS: Ms = 5000;
 const POLL_MS = 2;
 /** How far a full picture is is told this often. */
 const PART_MS = 500;
@@ -87,6 +94,11 @@ export class FrameLoop {
   #pictureSegments = 0;
   #longest: Ms = 0;
   #partTold: Ms = -Infinity;
+  /** The file is thought to grow until then. */
+  #growsUntil: Ms = -Infinity;
+  /** A picture of what has come is drawn then at the earliest; and how long after that one the next. */
+  #nextGrowth: Ms = -Infinity;
+  #growthMs: Ms = GROWTH_MS;
   #resting: (() => void)[] = [];
 
   constructor(painter: Painter, clock: FrameClock, report: (report: FrameReport) => void) {
@@ -97,15 +109,33 @@ export class FrameLoop {
 
   /** Something that moves has changed the picture. */
   moved(): void {
-    this.#changed(REST_MS);
+    this.#changed();
   }
 
-  /** The file has grown, and will again: a full picture is not begun between. */
+  /** A file begins: what comes first of it is shown at once. */
+  begins(): void {
+    this.#growsUntil = -Infinity;
+    this.#nextGrowth = -Infinity;
+    this.#growthMs = GROWTH_MS;
+  }
+
+  /** The file has grown, and will again: a picture now and then, and no full one is begun between. */
   grew(): void {
-    this.#changed(GROWTH_REST_MS);
+    const now = this.#clock.now();
+    this.#growsUntil = now + GROWTH_REST_MS;
+    if (now < this.#nextGrowth) return;
+    this.#nextGrowth = now + this.#growthMs;
+    this.#growthMs = Math.min(this.#growthMs * GROWTH_SLOWER, GROWTH_MAX_MS);
+    this.#changed();
   }
 
-  #changed(restMs: Ms): void {
+  /** The file grows no more. */
+  ended(): void {
+    this.#growsUntil = -Infinity;
+    this.#changed();
+  }
+
+  #changed(): void {
     if (this.#fullFits()) {
       this.redraw();
       return;
@@ -114,12 +144,25 @@ export class FrameLoop {
     this.#fullWanted = false;
     this.#quickWanted = true;
     this.#schedule();
+    this.#rest(REST_MS);
+  }
+
+  /** The full picture is begun after that, or when the file grows no more. */
+  #rest(delayMs: Ms): void {
     if (this.#timer !== null) this.#clock.clearTimer(this.#timer);
     this.#timer = this.#clock.setTimer(() => {
       this.#timer = null;
+      const wait = this.#growsUntil - this.#clock.now();
+      if (wait > 0) return this.#rest(wait);
       this.#fullWanted = true;
       this.#schedule();
-    }, restMs);
+    }, delayMs);
+  }
+
+  /** A picture has taken so long. */
+  #took(elapsed: Ms): void {
+    const pause = Math.min(elapsed * GROWTH_PAUSE, GROWTH_PAUSE_MAX_MS);
+    this.#nextGrowth = Math.max(this.#nextGrowth, this.#clock.now() + pause);
   }
 
   /** The picture is to be drawn anew; the old one stays until then. */
@@ -187,6 +230,7 @@ export class FrameLoop {
       const segments = this.#painter.drawQuick(this.#quickBudget.segments);
       this.#await(began, (elapsed) => {
         this.#quickBudget.measured(segments, elapsed);
+        this.#took(elapsed);
         this.#tell({ kind: 'quick', segments, longestMs: elapsed, totalMs: elapsed });
       });
     } else if (this.#fullWanted) {
@@ -228,6 +272,7 @@ export class FrameLoop {
       this.#longest = Math.max(this.#longest, elapsed);
       if (!complete) return this.#tellPart();
       const totalMs = this.#clock.now() - this.#pictureBegan;
+      this.#took(totalMs);
       this.#tell({ kind: 'full', segments: this.#pictureSegments, longestMs: this.#longest, totalMs });
     });
   }

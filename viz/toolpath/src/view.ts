@@ -43,10 +43,6 @@ export interface ViewSizePx {
   readonly ratio: number;
 }
 
-/** While vertices arrive, the picture follows this often: first soon, then not so often that drawing delays the reading. */
-const GROWTH_FRAME_MS: Ms = 150;
-const GROWTH_FRAME_MAX_MS: Ms = 1000;
-const GROWTH_SLOWER = 1.5;
 /** Found ranges are told at most this often. */
 const RANGES_MS: Ms = 250;
 
@@ -84,8 +80,6 @@ export class ToolpathView {
   #follows = false;
   /** The camera stands where it was put to see all: then it goes on doing so. */
   #isFitted = false;
-  #grown: Ms = 0;
-  #growthMs: Ms = GROWTH_FRAME_MS;
   #rangesTimer: ReturnType<typeof setTimeout> | null = null;
 
   constructor(
@@ -123,24 +117,26 @@ export class ToolpathView {
     this.#empty();
     this.#model.content = new Content(header);
     this.#model.printed = ALL_PRINTED;
-    // The first vertices are shown at once; until then there is nothing to see.
-    this.#grown = -Infinity;
-    this.#growthMs = GROWTH_FRAME_MS;
+    this.#loop.begins();
   }
 
   /** The next vertices of the file, four words each; the array is copied. */
   append(vertices: Uint32Array): void {
-    this.#model.content?.append(vertices);
+    const { content } = this.#model;
+    if (!content) return;
+    content.append(vertices);
     this.#tellRanges();
-    this.#hasGrown();
+    this.#loop.grew();
   }
 
   /** Planner channels of the next vertices that have none yet, four words each; the array is copied. */
   appendChannels(words: Uint32Array): void {
-    this.#model.content?.appendChannels(words);
+    const { content, mode } = this.#model;
+    if (!content) return;
+    content.appendChannels(words);
     this.#drawing.uploadChannels();
     this.#tellRanges();
-    if (isPlanned(this.#model.mode)) this.#hasGrown();
+    if (isPlanned(mode)) this.#loop.grew();
   }
 
   /** The file has no more vertices. */
@@ -148,7 +144,7 @@ export class ToolpathView {
     const { content } = this.#model;
     content?.end();
     this.#tellRanges();
-    this.#loop.moved();
+    this.#loop.ended();
     if (content) this.#tell({ type: 'built', vertices: content.store.count });
   }
 
@@ -362,15 +358,6 @@ export class ToolpathView {
     if (x !== at[0] || y !== at[1] || z !== at[2]) this.#move({ ...camera, targetMm: at });
   }
 
-  #hasGrown(): void {
-    if (!this.#model.content) return;
-    const now = performance.now();
-    if (now - this.#grown < this.#growthMs) return;
-    this.#grown = now;
-    this.#growthMs = Math.min(this.#growthMs * GROWTH_SLOWER, GROWTH_FRAME_MAX_MS);
-    this.#loop.grew();
-  }
-
   /** Soon, and not oftener than it helps. */
   #tellRanges(): void {
     this.#rangesTimer ??= setTimeout(() => {
@@ -380,7 +367,7 @@ export class ToolpathView {
       this.#tell({ type: 'ranges', ranges: content.ranges, isWhole: content.isWhole });
       // What has come since the last picture may be in colour.
       if (!isPlanned(mode)) return;
-      if (content.isWhole) this.#loop.moved();
+      if (content.isWhole) this.#loop.ended();
       else this.#loop.grew();
     }, RANGES_MS);
   }

@@ -11,8 +11,11 @@ import type { FromPreview, Summary, ToPreview } from './protocol';
 import { SlicedFile } from './sliced_file';
 import { Unpacked } from './unpacked';
 
-/** Progress is told this often at most, in ms. */
-const PROGRESS_MS = 50;
+/**
+ * Progress is told this often at most, in ms, and where lines lie on the path: each time, the page puts a picture of itself
+ * together, and where the processor does that, it is taken from the reading.
+ */
+const PROGRESS_MS = 250;
 
 const scope = self as unknown as { postMessage(message: FromPreview, transfer?: Transferable[]): void };
 const tell = (message: FromPreview, transfer: Transferable[] = []): void =>
@@ -60,14 +63,32 @@ interface Opened {
 }
 let opened: Opened | undefined;
 
+/** Where the lines of the open file lie on the path, as far as the page has not been told. */
+let places: { readonly job: number; readonly marks: Numbers32[]; readonly steps: Numbers8[] } | undefined;
+type Numbers32 = Uint32Array<ArrayBuffer>;
+type Numbers8 = Uint8Array<ArrayBuffer>;
+
+function tellPlaces(): void {
+  if (!places) return;
+  const { job, marks, steps } = places;
+  places = undefined;
+  tell({ kind: 'places', job, marks, steps }, [...marks, ...steps].map(({ buffer }) => buffer));
+}
+
+function takePlaces(preview: FilePreview, job: number): void {
+  const marks = preview.takeMarks();
+  const steps = preview.takeLineSteps();
+  if (marks.length === 0 && steps.length === 0) return;
+  if (places?.job !== job) places = { job, marks: [], steps: [] };
+  places.marks.push(marks);
+  places.steps.push(steps);
+}
+
 /** Hands out what came of the bytes that were fed. */
 function pass(preview: FilePreview, job: number): void {
   for (;;) {
     const vertices = preview.takeVertices();
-    const marks = preview.takeMarks();
-    if (marks.length > 0) tell({ kind: 'marks', job, marks }, [marks.buffer]);
-    const steps = preview.takeLineSteps();
-    if (steps.length > 0) tell({ kind: 'line-steps', job, steps }, [steps.buffer]);
+    takePlaces(preview, job);
     const thumbnails = preview.takeThumbnails();
     if (thumbnails.length > 0) tell({ kind: 'thumbnails', job, thumbnails });
     if (vertices.length === 0) return;
@@ -107,6 +128,7 @@ function progress(job: number): (share: number, lines: number) => void {
   return (share, lines) => {
     if (performance.now() - told <= PROGRESS_MS) return;
     told = performance.now();
+    tellPlaces();
     tell({ kind: 'progress', job, share, lines });
   };
 }
@@ -128,6 +150,7 @@ async function readGeometry(chunks: Chunks, preview: FilePreview, open: Opened):
   }
   preview.finish();
   pass(preview, job);
+  tellPlaces();
   const outline = preview.summary();
   draw(job, { type: 'setLayers', layers: layersOf(outline) });
   draw(job, { type: 'end' });

@@ -245,11 +245,9 @@ function take(message: FromPreview): void {
   // What is still on its way from a file that was put away.
   if (message.job !== null && message.job !== job) return;
   switch (message.kind) {
-    case 'marks':
-      marks.append(message.marks);
-      break;
-    case 'line-steps':
-      marks.appendSteps(message.steps);
+    case 'places':
+      for (const more of message.marks) marks.append(more);
+      for (const more of message.steps) marks.appendSteps(more);
       break;
     case 'slow-text':
       isTextSlow.value = true;
@@ -258,12 +256,16 @@ function take(message: FromPreview): void {
       thumbnails.value = [...thumbnails.value, ...message.thumbnails];
       break;
     case 'progress':
-      reading.value = Math.min(1, message.share);
-      linesRead.value = message.lines;
+      batch(() => {
+        reading.value = Math.min(1, message.share);
+        linesRead.value = message.lines;
+      });
       break;
     case 'outline':
-      linesRead.value = message.outline.lines;
-      outline.value = message.outline;
+      batch(() => {
+        linesRead.value = message.outline.lines;
+        outline.value = message.outline;
+      });
       break;
     case 'summary':
       deaths = 0;
