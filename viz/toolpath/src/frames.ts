@@ -123,7 +123,8 @@ export class FrameLoop {
   grew(): void {
     const now = this.#clock.now();
     this.#growsUntil = now + GROWTH_REST_MS;
-    if (now < this.#nextGrowth) return;
+    // How long a picture takes, and with it the pause, is known when it is done.
+    if (now < this.#nextGrowth || this.#frame !== null || this.#poll !== null) return;
     this.#nextGrowth = now + this.#growthMs;
     this.#growthMs = Math.min(this.#growthMs * GROWTH_SLOWER, GROWTH_MAX_MS);
     this.#changed();
