@@ -20,6 +20,8 @@ const CLIMB_MAX_MM: Mm = 0.05;
 /** A run has at most so many segments, so that the printed part is told apart finely enough. */
 const RUN_MAX = 256;
 
+/** From straight on to aside, in radians. */
+const HALF_TURN = Math.PI / 2;
 const POSITION = 0xf_ffff;
 const SIZE = ~POSITION;
 const FEATURE = ((1 << FIELDS.feature.bits) - 1) << FIELDS.feature.shift;
@@ -121,7 +123,11 @@ export class Coarsener {
     const distance = Math.sqrt(dx * dx + dy * dy);
     // Back on the same way, or too steep.
     if (distance < this.#reach || Math.abs((z & POSITION) - this.#anchorZ) > this.#climb) return false;
-    const turn = angleOf(this.#aheadX * dx + this.#aheadY * dy, this.#aheadX * dy - this.#aheadY * dx);
+    const along = this.#aheadX * dx + this.#aheadY * dy;
+    const aside = this.#aheadX * dy - this.#aheadY * dx;
+    // Corners need no angle.
+    if (along < 0 && this.#low > -HALF_TURN && this.#high < HALF_TURN) return false;
+    const turn = angleOf(along, aside);
     if (turn < this.#low || turn > this.#high) return false;
     const half = this.#halfAngle(distance);
     this.#low = Math.max(this.#low, turn - half);

@@ -3,6 +3,7 @@ import type { JSX } from 'preact';
 import { file, outline, reading } from '../state/preview';
 import { settings } from '../state/settings';
 import { Icon } from './icons';
+import { Later } from './later';
 import { formatNumber } from './numbers';
 import { openSample, pickFile } from './open_file';
 import { Button } from './parts';
@@ -95,19 +96,29 @@ export function Viewer(): JSX.Element {
           </div>
           {outline.value && hasView && (
             <>
-              <Legend isFlat={isFlat.value} />
+              <Later pictures={2}>
+                <Legend isFlat={isFlat.value} />
+              </Later>
               <SegmentCard />
               <HoverNote />
             </>
           )}
         </div>
-        {outline.value && hasView && <LayerBar />}
+        {outline.value && hasView && (
+          <Later pictures={1}>
+            <LayerBar />
+          </Later>
+        )}
         {hasText && <GcodeText />}
       </div>
       {progress !== null && (
         <progress class="reading" aria-label="Reading the file" max={1} value={progress} />
       )}
-      {outline.value && hasView && <MoveBar />}
+      {outline.value && hasView && (
+        <Later pictures={1}>
+          <MoveBar />
+        </Later>
+      )}
     </section>
   );
 }

@@ -15,7 +15,7 @@ import { Unpacked } from './unpacked';
  * Progress is told this often at most, in ms, and where lines lie on the path: each time, the page puts a picture of itself
  * together, and where the processor does that, it is taken from the reading.
  */
-const PROGRESS_MS = 250;
+const PROGRESS_MS = 400;
 
 const scope = self as unknown as { postMessage(message: FromPreview, transfer?: Transferable[]): void };
 const tell = (message: FromPreview, transfer: Transferable[] = []): void =>
@@ -72,7 +72,10 @@ function tellPlaces(): void {
   if (!places) return;
   const { job, marks, steps } = places;
   places = undefined;
-  tell({ kind: 'places', job, marks, steps }, [...marks, ...steps].map(({ buffer }) => buffer));
+  tell(
+    { kind: 'places', job, marks, steps },
+    [...marks, ...steps].map(({ buffer }) => buffer),
+  );
 }
 
 function takePlaces(preview: FilePreview, job: number): void {
