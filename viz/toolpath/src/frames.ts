@@ -99,6 +99,10 @@ export class FrameLoop {
   /** A picture of what has come is drawn then at the earliest; and how long after that one the next. */
   #nextGrowth: Ms = -Infinity;
   #growthMs: Ms = GROWTH_MS;
+  /** What the last quick or full picture took. */
+  #tookMs: Ms = 0;
+  /** Runs while changes are gathered. */
+  #gathering: number | null = null;
   #resting: (() => void)[] = [];
 
   constructor(painter: Painter, clock: FrameClock, report: (report: FrameReport) => void) {
@@ -133,10 +137,20 @@ export class FrameLoop {
   /** The file grows no more. */
   ended(): void {
     this.#growsUntil = -Infinity;
-    this.#changed();
+    this.changed();
+  }
+
+  /** Something has changed that is no movement: more may follow, and where pictures take long all of it is drawn at once. */
+  changed(): void {
+    if (this.#tookMs <= FRAME_TARGET_MS) return this.#changed();
+    this.#picture = 'none';
+    this.#fullWanted = false;
+    this.#gathering ??= this.#clock.setTimer(() => this.#changed(), REST_MS);
   }
 
   #changed(): void {
+    if (this.#gathering !== null) this.#clock.clearTimer(this.#gathering);
+    this.#gathering = null;
     if (this.#fullFits()) {
       this.redraw();
       return;
@@ -162,6 +176,7 @@ export class FrameLoop {
 
   /** A picture has taken so long. */
   #took(elapsed: Ms): void {
+    this.#tookMs = elapsed;
     const pause = Math.min(elapsed * GROWTH_PAUSE, GROWTH_PAUSE_MAX_MS);
     this.#nextGrowth = Math.max(this.#nextGrowth, this.#clock.now() + pause);
   }
@@ -196,11 +211,13 @@ export class FrameLoop {
   /** Draws no more until {@link resume}. */
   pause(): void {
     this.#stopped = true;
-    for (const handle of [this.#timer, this.#poll]) if (handle !== null) this.#clock.clearTimer(handle);
+    for (const handle of [this.#timer, this.#poll, this.#gathering])
+      if (handle !== null) this.#clock.clearTimer(handle);
     if (this.#frame !== null) this.#clock.cancelFrame(this.#frame);
     this.#frame = null;
     this.#timer = null;
     this.#poll = null;
+    this.#gathering = null;
     this.#picture = 'none';
   }
 
@@ -282,8 +299,12 @@ export class FrameLoop {
     return this.#quickWanted || this.#fullWanted || this.#patchWanted || this.#overlayWanted;
   }
 
+  #isWaiting(): boolean {
+    return this.#timer !== null || this.#gathering !== null;
+  }
+
   #isAtRest(): boolean {
-    return this.#picture === 'complete' && !this.#isWanted() && this.#timer === null;
+    return this.#picture === 'complete' && !this.#isWanted() && !this.#isWaiting();
   }
 
   /** Now and then, how far the full picture is. */
@@ -297,7 +318,7 @@ export class FrameLoop {
   }
 
   #tell(report: Omit<FrameReport, 'more' | 'share'> & { readonly share?: number }): void {
-    this.#report({ share: 1, ...report, more: this.#isWanted() || this.#timer !== null });
+    this.#report({ share: 1, ...report, more: this.#isWanted() || this.#isWaiting() });
     if (!this.#isAtRest()) return;
     for (const callback of this.#resting.splice(0)) callback();
   }

@@ -162,7 +162,7 @@ export class ToolpathView {
     this.#drawing.layerTimes.set(layers);
     this.#tellRanges();
     // Times alone change no picture but that of times.
-    if (!same || this.#model.mode === 'layerTime') this.#loop.moved();
+    if (!same || this.#model.mode === 'layerTime') this.#loop.changed();
   }
 
   show(shown: Partial<Shown>): void {

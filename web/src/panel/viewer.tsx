@@ -96,7 +96,7 @@ export function Viewer(): JSX.Element {
           </div>
           {outline.value && hasView && (
             <>
-              <Later pictures={2}>
+              <Later pictures={1}>
                 <Legend isFlat={isFlat.value} />
               </Later>
               <SegmentCard />
@@ -105,7 +105,7 @@ export function Viewer(): JSX.Element {
           )}
         </div>
         {outline.value && hasView && (
-          <Later pictures={1}>
+          <Later pictures={2}>
             <LayerBar />
           </Later>
         )}
@@ -115,7 +115,7 @@ export function Viewer(): JSX.Element {
         <progress class="reading" aria-label="Reading the file" max={1} value={progress} />
       )}
       {outline.value && hasView && (
-        <Later pictures={1}>
+        <Later pictures={2}>
           <MoveBar />
         </Later>
       )}
