@@ -53,6 +53,56 @@ test('the part stays in view as long as nobody has come nearer', async ({ panel,
   expect((await viewer.picture()).equals(alone), 'without the legend').toBe(true);
 });
 
+test.describe('while the file is still coming', () => {
+  // The page's main thread carries here what it never does otherwise.
+  test.use({ areTasksJudged: false });
+  test('what was moved stays as it is', async ({ panel, page }) => {
+    test.setTimeout(90_000);
+    // The end of the geometry is on its way to the view as long as the test likes.
+    await page.addInitScript(() => {
+      window.Worker = class extends Worker {
+        override postMessage(
+          message: { readonly type?: string; readonly port?: MessagePort },
+          transfer: Transferable[] | StructuredSerializeOptions = [],
+        ): void {
+          const { type, port: source } = message;
+          if (type !== 'source' || !source) return super.postMessage(message, transfer as Transferable[]);
+          const { port1, port2: port } = new MessageChannel();
+          const held: unknown[] = [];
+          let isHolding = true;
+          source.onmessage = ({ data }: MessageEvent<{ readonly request: { readonly type: string } }>) => {
+            if (isHolding && (held.length > 0 || data.request.type === 'end')) held.push(data);
+            else port1.postMessage(data);
+          };
+          const built = new Promise<void>((resolve) => {
+            this.addEventListener('message', ({ data }: MessageEvent<{ readonly type: string }>) => {
+              if (data.type === 'built') resolve();
+            });
+          });
+          Object.assign(window, {
+            letGo: () => {
+              isHolding = false;
+              for (const one of held) port1.postMessage(one);
+              return built;
+            },
+          });
+          super.postMessage({ type, port }, [port]);
+        }
+      };
+    });
+    await panel.open();
+    const viewer = new Viewer(page);
+    await panel.drop(sample('test-part-small.gcode'));
+    await viewer.ready();
+    await viewer.view.focus();
+    await page.keyboard.press('+');
+    await page.evaluate(() => (window as unknown as { letGo(): Promise<void> }).letGo());
+    const nearer = await viewer.picture();
+    await page.keyboard.press('Home');
+    expect((await viewer.picture()).equals(nearer), 'it was not put to see all').toBe(false);
+  });
+});
+
 test('a picture of the view is kept as PNG', async ({ panel, page }) => {
   const viewer = new Viewer(page);
   await panel.drop(sample('test-part.gcode'));

@@ -227,6 +227,8 @@ function take(event: ViewEvent): void {
     viewFailure.value = event.reason;
     isFlat.value = event.isFlat;
   }
+  // All is drawn anew once there is a context again.
+  if (event.type === 'contextLost') void awaitPicture();
   if (event.type === 'frame') drawnShare.value = event.report.kind === 'part' ? event.report.share : null;
   if (event.type === 'ranges') ranges.value = { found: event.ranges, isWhole: event.isWhole };
 }
