@@ -2,7 +2,7 @@
 import type { Worker } from '@playwright/test';
 import { expect, test } from '../fixtures/files.ts';
 import { sample } from '../pages/panel.ts';
-import { Viewer } from '../pages/viewer.ts';
+import { inView } from '../pages/viewer.ts';
 
 /** Put before the workers' own scripts: keeps what takes a context away. */
 const KEEP_CONTEXT = `{
@@ -26,9 +26,7 @@ test('a view whose context was lost is as it was before', async ({ panel, page }
     await route.fulfill({ response, body: KEEP_CONTEXT + (await response.text()) });
   });
   await panel.open();
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part-small.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part-small.gcode'));
   // From the vertices and from what the planner says of them, seen from elsewhere than at first.
   await viewer.colourBy.selectOption('speed');
   await viewer.view.focus();

@@ -1,7 +1,7 @@
 // Where one looks from, how, and a picture to keep; the machine around the part.
 import { expect, test } from '../fixtures/files.ts';
 import { sample } from '../pages/panel.ts';
-import { Viewer } from '../pages/viewer.ts';
+import { inView, Viewer } from '../pages/viewer.ts';
 
 /** The page asks so many times before it gives up. */
 const PICTURE_TRIES = 3;
@@ -9,9 +9,7 @@ const PNG_BEGINNING = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0
 
 test('the view is turned by buttons and keys, with and without perspective', async ({ panel, page }) => {
   test.setTimeout(240_000);
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part.gcode'));
   const seen: Buffer[] = [];
   const expectNew = async (what: string): Promise<void> => {
     const now = await viewer.picture();
@@ -37,9 +35,7 @@ test('the view is turned by buttons and keys, with and without perspective', asy
 
 test('the part stays in view as long as nobody has come nearer', async ({ panel, page }) => {
   test.setTimeout(90_000);
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part.gcode'));
   const legend = viewer.legend.getByText('Colours', { exact: true });
   const beside = await viewer.picture();
   await viewer.view.focus();
@@ -91,9 +87,7 @@ test.describe('while the file is still coming', () => {
       };
     });
     await panel.open();
-    const viewer = new Viewer(page);
-    await panel.drop(sample('test-part-small.gcode'));
-    await viewer.ready();
+    const viewer = await inView(panel, sample('test-part-small.gcode'));
     await viewer.view.focus();
     await page.keyboard.press('+');
     await page.evaluate(() => (window as unknown as { letGo(): Promise<void> }).letGo());
@@ -104,9 +98,7 @@ test.describe('while the file is still coming', () => {
 });
 
 test('a picture of the view is kept as PNG', async ({ panel, page }) => {
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part.gcode'));
   await viewer.picture();
   // In full detail and large: without a graphics card that takes its time.
   test.setTimeout(150_000);
@@ -139,9 +131,7 @@ test('that no picture could be made is said, and tried again', async ({ panel, p
     };
   }, PICTURE_TRIES);
   await panel.open();
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part-small.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part-small.gcode'));
   await viewer.button('Save a picture').focus();
   await page.keyboard.press('Enter');
   const notices = page.getByRole('status', { name: 'Notices' });
@@ -157,9 +147,7 @@ test.describe('by touch', () => {
   test.use({ hasTouch: true });
   test('one finger turns the view, two come nearer, a tap chooses', async ({ panel, page }) => {
     test.setTimeout(90_000);
-    const viewer = new Viewer(page);
-    await panel.drop(sample('test-part.gcode'));
-    await viewer.ready();
+    const viewer = await inView(panel, sample('test-part.gcode'));
     const session = await page.context().newCDPSession(page);
     const touch = async (type: 'touchStart' | 'touchMove' | 'touchEnd', ...xs: number[]): Promise<void> => {
       const touchPoints = xs.map((dx, id) => ({ x: x + dx, y, id }));

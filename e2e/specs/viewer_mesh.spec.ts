@@ -2,7 +2,7 @@
 import { readFileSync } from 'node:fs';
 import { expect, test } from '../fixtures/files.ts';
 import { type Panel, sample } from '../pages/panel.ts';
-import { Viewer } from '../pages/viewer.ts';
+import { inView, Viewer } from '../pages/viewer.ts';
 
 const PLACE = 'x_count: 3\ny_count: 3\nmin_x: 20\nmax_x: 280\nmin_y: 20\nmax_y: 280\n';
 const MESHES = `
@@ -29,10 +29,8 @@ async function useMachine(panel: Panel, path: string): Promise<void> {
 
 test('the mesh that is in force is shown as a surface', async ({ panel, page, makeFile }) => {
   test.setTimeout(120_000);
-  const viewer = new Viewer(page);
+  const viewer = await inView(panel, sample('test-part-small.gcode'));
   const part = viewer.region.getByRole('region', { name: 'Bed mesh of the machine' });
-  await panel.drop(sample('test-part-small.gcode'));
-  await viewer.ready();
   await expect(part).toHaveCount(0);
   await useMachine(panel, makeFile('bent.cfg', readFileSync(sample('printer.cfg'), 'utf8') + MESHES));
   await viewer.ready();
