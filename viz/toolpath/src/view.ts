@@ -78,7 +78,7 @@ export class ToolpathView {
   #highlight: VertexIndex | null = null;
   #nozzleMm: Vec3 | null = null;
   #follows = false;
-  /** The camera stands where it was put to see all: then it goes on doing so. */
+  /** Nobody has moved the camera since it was put to see all: then it goes on doing so. */
   #isFitted = false;
   #rangesTimer: ReturnType<typeof setTimeout> | null = null;
 
@@ -144,6 +144,7 @@ export class ToolpathView {
     const { content } = this.#model;
     content?.end();
     this.#tellRanges();
+    this.#seeAll();
     this.#loop.ended();
     if (content) this.#tell({ type: 'built', vertices: content.store.count });
   }
@@ -288,11 +289,10 @@ export class ToolpathView {
 
   /** The whole part in view, or the bed when there is none; `direction` also turns the camera. */
   fit(direction?: Pick<CameraState, 'azimuth' | 'elevation'>): void {
-    const { camera, content, bedBox } = this.#model;
-    const box = content?.store.box() ?? bedBox ?? EMPTY_BOX;
-    const fitted = fit({ ...camera, ...direction }, box, this.#drawing.stage.size);
+    const { camera, content } = this.#model;
+    const fitted = this.#cameraOnAll(direction);
     // The empty bed is not drawn again when a file is about to come.
-    if (content || !isSameCamera(fitted, camera)) this.#move(fitted);
+    if (content || !isSameCamera(fitted, camera)) this.#put(fitted);
     this.#isFitted = true;
   }
 
@@ -302,15 +302,13 @@ export class ToolpathView {
   }
 
   setProjection(projection: Projection): void {
-    const isFitted = this.#isFitted;
-    this.#move({ ...this.#model.camera, projection });
-    this.#isFitted = isFitted;
+    this.#put({ ...this.#model.camera, projection });
   }
 
   resize({ width, height, ratio }: ViewSizePx): void {
     this.#drawing.smooth.reset();
     this.#drawing.stage.resize(width, height, ratio);
-    if (this.#isFitted) this.fit();
+    this.#seeAll();
     this.#loop.moved();
   }
 
@@ -339,10 +337,28 @@ export class ToolpathView {
     this.#tell({ type: 'contextRestored' });
   };
 
+  /** The user moves it. */
   #move(camera: CameraState): void {
     this.#isFitted = false;
+    this.#put(camera);
+  }
+
+  #put(camera: CameraState): void {
     this.#model.camera = camera;
     this.#loop.moved();
+  }
+
+  #cameraOnAll(direction?: Pick<CameraState, 'azimuth' | 'elevation'>): CameraState {
+    const { camera, content, bedBox } = this.#model;
+    const box = content?.store.box() ?? bedBox ?? EMPTY_BOX;
+    return fit({ ...camera, ...direction }, box, this.#drawing.stage.size);
+  }
+
+  /** All that there is by now, unless the user has moved the camera. It is not drawn by this. */
+  #seeAll(): void {
+    if (!this.#isFitted) return;
+    this.#model.camera = this.#cameraOnAll();
+    this.#followNozzle();
   }
 
   /** Without a file there is nothing to be drawn anew: the first picture of the next one need not wait for that. */
@@ -355,7 +371,7 @@ export class ToolpathView {
     const { camera } = this.#model;
     if (!this.#follows || !at) return;
     const [x, y, z] = camera.targetMm;
-    if (x !== at[0] || y !== at[1] || z !== at[2]) this.#move({ ...camera, targetMm: at });
+    if (x !== at[0] || y !== at[1] || z !== at[2]) this.#put({ ...camera, targetMm: at });
   }
 
   /** Soon, and not oftener than it helps. */

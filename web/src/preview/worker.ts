@@ -157,7 +157,6 @@ async function readGeometry(chunks: Chunks, preview: FilePreview, open: Opened):
   const outline = preview.summary();
   draw(job, { type: 'setLayers', layers: layersOf(outline) });
   draw(job, { type: 'end' });
-  draw(job, { type: 'fit' });
   tell({ kind: 'outline', job, outline });
   return outline;
 }
