@@ -141,6 +141,8 @@ export type ToPreview =
       readonly name: string;
       readonly config: string | null;
     }
+  /** The outline is shown: the planner may have the processor. */
+  | { readonly kind: 'plan'; readonly job: number }
   /** Nothing is to be read any more, or shown of what was. */
   | { readonly kind: 'close'; readonly job: number }
   /** Where the geometry goes: requests of the 3D view, each with its job, past the page's main thread. */

@@ -211,6 +211,9 @@ async function refusalOf(
   return reader.refuse(first ?? new Uint8Array(), name.replace(/\.gz$/i, ''));
 }
 
+/** Until the page has shown the outline, it has the processor to itself: it is not held up by what nobody waits for yet. */
+let waiting: { readonly job: number; readonly go: () => void } | undefined;
+
 async function read(
   reader: Reader,
   { job, file, name, config: machine }: ToPreview & { kind: 'open' },
@@ -226,8 +229,11 @@ async function read(
   const outline = await through(open, preview, readGeometry);
   if (!outline || current !== job) return;
   if (unpacked?.isGivenUp) tell({ kind: 'slow-text', job });
-  if (config === null) tell({ kind: 'summary', job, summary: outline });
-  else await through(open, reader.preview(config), readPlan);
+  if (config === null) return tell({ kind: 'summary', job, summary: outline });
+  await new Promise<void>((go) => {
+    waiting = { job, go };
+  });
+  if (current === job) await through(open, reader.preview(config), readPlan);
 }
 
 async function open(message: ToPreview & { kind: 'open' }): Promise<void> {
@@ -284,6 +290,8 @@ async function tellText({ id, job, first, last }: ToPreview & { kind: 'text' }):
 function close(job: number): void {
   current = job;
   opened = undefined;
+  waiting?.go();
+  waiting = undefined;
 }
 
 self.onmessage = ({ data }: MessageEvent<ToPreview>): void => {
@@ -292,6 +300,9 @@ self.onmessage = ({ data }: MessageEvent<ToPreview>): void => {
       return void open(data);
     case 'close':
       return close(data.job);
+    case 'plan':
+      if (waiting?.job === data.job) waiting.go();
+      return;
     case 'draw':
       drawing = data.port;
       return;
