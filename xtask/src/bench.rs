@@ -108,7 +108,7 @@ impl Summary {
 
 /// The stage of the way that a crate's module belongs to.
 fn stage_of(krate: &str, module: &str) -> &'static str {
-    let packs = ["stabbing", "compressor", "windows"];
+    let packs = ["stabbing", "compressor", "windows", "ahead"];
     match krate {
         "gcode" | "memchr" => "parse",
         "motion" | "printer" => "plan",

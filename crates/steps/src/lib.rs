@@ -11,7 +11,7 @@
 //! hysteresis and nothing accumulates: after any move the count is that of the move's end, rounded.
 //!
 //! The packing is line stabbing: [`generator`](StepGenerator) → `crossing` (step times) → `compressor` (windows around
-//! them) → `stabbing` (the longest quadratic with whole coefficients through the windows).
+//! them) → `stabbing` (the longest quadratic with whole coefficients through the windows) → `ahead` (where it ends).
 
 mod advance;
 mod ahead;
