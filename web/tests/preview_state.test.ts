@@ -66,3 +66,9 @@ test('what a print waits for is said, as far as the file has come', async () => 
   workers[0]?.say({ kind: 'summary', job: 1, summary: summaryOf() });
   expect(obstacle.value).not.toContain('still');
 });
+
+test('the planner is let go once the outline is shown', async () => {
+  page.openFile(new Blob(['G28']), 'part.gcode');
+  workers[0]?.say({ kind: 'outline', job: 1, outline: summaryOf() });
+  await vi.waitFor(() => expect(workers[0]?.sent.at(-1)).toEqual({ kind: 'plan', job: 1 }));
+});

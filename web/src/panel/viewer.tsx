@@ -4,6 +4,7 @@ import { meshShown } from '../state/mesh';
 import { file, outline, reading } from '../state/preview';
 import { settings } from '../state/settings';
 import { Icon } from './icons';
+import { Later } from './later';
 import { formatNumber } from './numbers';
 import { openSample, pickFile } from './open_file';
 import { Button } from './parts';
@@ -99,19 +100,29 @@ export function Viewer(): JSX.Element {
           {!file.value && hasView && !isFlat.value && <MeshAlone />}
           {outline.value && hasView && (
             <>
-              <Legend isFlat={isFlat.value} />
+              <Later pictures={1}>
+                <Legend isFlat={isFlat.value} />
+              </Later>
               <SegmentCard />
               <HoverNote />
             </>
           )}
         </div>
-        {outline.value && hasView && <LayerBar />}
+        {outline.value && hasView && (
+          <Later pictures={2}>
+            <LayerBar />
+          </Later>
+        )}
         {hasText && <GcodeText />}
       </div>
       {progress !== null && (
         <progress class="reading" aria-label="Reading the file" max={1} value={progress} />
       )}
-      {outline.value && hasView && <MoveBar />}
+      {outline.value && hasView && (
+        <Later pictures={2}>
+          <MoveBar />
+        </Later>
+      )}
     </section>
   );
 }
