@@ -5,6 +5,9 @@ import { BEFORE_BEADS } from '../fixtures/gcode.ts';
 import { sample } from '../pages/panel.ts';
 import { inView, Viewer } from '../pages/viewer.ts';
 
+// Pictures in full detail take their time without a graphics card, and more where the machine has other work.
+test.describe.configure({ timeout: 120_000 });
+
 const MODES = [
   'Layer height',
   'Line width',
@@ -36,7 +39,6 @@ test('features have their shares of time and filament, and can be taken away', a
 });
 
 test('each mode has its colours, and those that are measured their limits', async ({ panel }) => {
-  test.setTimeout(120_000);
   const viewer = await inView(panel, sample('test-part.gcode'));
   const least = viewer.legend.getByRole('textbox', { name: /^Least/ });
   const greatest = viewer.legend.getByRole('textbox', { name: /^Greatest/ });
@@ -72,7 +74,6 @@ test('temperature, fan and tools have the colours of what the file sets', async 
   page,
   makeFile,
 }) => {
-  test.setTimeout(120_000);
   const viewer = new Viewer(page);
   await panel.look(makeFile('two-tools.gcode', TWO_TOOLS));
   await viewer.ready();
@@ -101,7 +102,6 @@ test('temperature, fan and tools have the colours of what the file sets', async 
 });
 
 test('what the planner has not worked out yet is said to be computing', async ({ panel, makeFile }) => {
-  test.setTimeout(120_000);
   const viewer = await inView(panel, sample('test-part-small.gcode'));
   await viewer.colourBy.selectOption('Acceleration');
   const part = readFileSync(sample('test-part-small.gcode'), 'utf8');

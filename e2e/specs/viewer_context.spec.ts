@@ -20,7 +20,7 @@ interface Kept {
 }
 
 test('a view whose context was lost is as it was before', async ({ panel, page }) => {
-  test.setTimeout(120_000);
+  test.setTimeout(180_000);
   await page.route('**/assets/worker-*.js', async (route) => {
     const response = await route.fetch();
     await route.fulfill({ response, body: KEEP_CONTEXT + (await response.text()) });

@@ -4,6 +4,9 @@ import { expect, test } from '../fixtures/files.ts';
 import { sample } from '../pages/panel.ts';
 import { Viewer } from '../pages/viewer.ts';
 
+// Pictures in full detail take their time without a graphics card, and more where the machine has other work.
+test.describe.configure({ timeout: 120_000 });
+
 /** Neither a graphics card nor a stand-in for one. */
 const GRAPHICS = /--use-|swiftshader/;
 const NO_GRAPHICS = ['--disable-gpu', '--disable-software-rasterizer'];

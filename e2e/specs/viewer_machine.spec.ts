@@ -34,7 +34,7 @@ test('the view is turned by buttons and keys, with and without perspective', asy
 });
 
 test('the part stays in view as long as nobody has come nearer', async ({ panel, page }) => {
-  test.setTimeout(90_000);
+  test.setTimeout(180_000);
   const viewer = await inView(panel, sample('test-part.gcode'));
   const legend = viewer.legend.getByText('Colours', { exact: true });
   const beside = await viewer.picture();
@@ -53,7 +53,7 @@ test.describe('while the file is still coming', () => {
   // The page's main thread carries here what it never does otherwise.
   test.use({ areTasksJudged: false });
   test('what was moved stays as it is', async ({ panel, page }) => {
-    test.setTimeout(90_000);
+    test.setTimeout(180_000);
     // The end of the geometry is on its way to the view as long as the test likes.
     await page.addInitScript(() => {
       window.Worker = class extends Worker {
@@ -146,7 +146,7 @@ test('that no picture could be made is said, and tried again', async ({ panel, p
 test.describe('by touch', () => {
   test.use({ hasTouch: true });
   test('one finger turns the view, two come nearer, a tap chooses', async ({ panel, page }) => {
-    test.setTimeout(90_000);
+    test.setTimeout(180_000);
     const viewer = await inView(panel, sample('test-part.gcode'));
     const session = await page.context().newCDPSession(page);
     const touch = async (type: 'touchStart' | 'touchMove' | 'touchEnd', ...xs: number[]): Promise<void> => {

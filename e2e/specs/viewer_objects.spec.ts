@@ -2,6 +2,9 @@
 import { expect, test } from '../fixtures/files.ts';
 import { inView, Viewer } from '../pages/viewer.ts';
 
+// Pictures in full detail take their time without a graphics card, and more where the machine has other work.
+test.describe.configure({ timeout: 120_000 });
+
 const square = (x: number, e: number): string =>
   [`G1 X${x} Y90 F6000`, `G1 X${x + 20} Y90 E${e}`, `Y110 E${e + 1}`, `X${x} E${e + 2}`, `Y90 E${e + 3}`]
     .map((line) => (line.startsWith('G') ? line : `G1 ${line}`))

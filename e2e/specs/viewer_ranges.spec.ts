@@ -4,6 +4,9 @@ import { BEFORE_BEADS } from '../fixtures/gcode.ts';
 import { sample } from '../pages/panel.ts';
 import { inView, Viewer } from '../pages/viewer.ts';
 
+// Pictures in full detail take their time without a graphics card, and more where the machine has other work.
+test.describe.configure({ timeout: 120_000 });
+
 test('layers and moves are chosen by keyboard and by pointer, and the picture follows', async ({
   panel,
   page,
@@ -81,7 +84,6 @@ test('moves are played at a speed, over the end of a layer, until they are pause
 const MARKERS = ['Travel moves', 'Wipes', 'Retractions', 'Seams', 'Tool changes', 'Pauses'];
 
 test('each kind of marker is drawn when it is asked for', async ({ panel, page, makeFile }) => {
-  test.setTimeout(120_000);
   const viewer = new Viewer(page);
   await panel.look(makeFile('markers.gcode', MARKED));
   await viewer.ready();

@@ -5,6 +5,9 @@ import { expect, test } from '../fixtures/files.ts';
 import { sample } from '../pages/panel.ts';
 import { inView, Viewer } from '../pages/viewer.ts';
 
+// Pictures in full detail take their time without a graphics card, and more where the machine has other work.
+test.describe.configure({ timeout: 120_000 });
+
 /** So many lines that their rows are taller than any element of a browser. */
 const LONG_LINES = 2_200_000;
 

@@ -5,7 +5,16 @@ import { useEffect, useRef } from 'preact/hooks';
 import { dateFormat } from '../dates';
 import type { Summary, Thumbnail } from '../preview/protocol';
 import { connection, isPrinting, job, outcome, snapshot, wish } from '../state/machine';
-import { closeFile, file, type OpenFile, openFile, summary, thumbnails } from '../state/preview';
+import {
+  closeFile,
+  failure,
+  file,
+  type OpenFile,
+  openFile,
+  outline,
+  summary,
+  thumbnails,
+} from '../state/preview';
 import {
   finishesIn,
   heatingUp,
@@ -41,11 +50,12 @@ function cancel(): void {
 
 const metres = (length: number): string => formatNumber(length / 1000, 2);
 
-/** What the file that is shown takes. */
+/** What the file that is shown takes; until the planner has gone through it, without the time. */
 function Plan({ plan }: { readonly plan: Summary }): JSX.Element {
+  const unknown = summary.value || failure.value ? '–' : 'Computing …';
   return (
     <dl class="facts">
-      <Fact name="Print time">{plan.time === null ? '–' : formatDuration(plan.time)}</Fact>
+      <Fact name="Print time">{plan.time === null ? unknown : formatDuration(plan.time)}</Fact>
       <Fact name="Filament">{metres(plan.filament)} m</Fact>
       <Fact name="Layers">{formatNumber(plan.layers.length)}</Fact>
       <Fact name="Height">{formatNumber(plan.bounds?.max[2] ?? 0, 2)} mm</Fact>
@@ -314,7 +324,7 @@ export function Job(): JSX.Element | null {
   const running = isPrinting.value ? printed.value : null;
   const open = running?.file ?? file.value;
   const far = progress.value;
-  const plan = summary.value;
+  const plan = outline.value;
   if (!open && !isPrinting.value && !outcome.value) return null;
   const hint = isPrinting.value ? waiting() : obstacle.value;
   return (
