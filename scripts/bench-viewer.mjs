@@ -207,7 +207,8 @@ async function slide(page, uploaded) {
     await sliders.nth(at).focus();
     for (const key of ['ArrowLeft', 'ArrowDown', 'PageDown', 'ArrowRight', 'End', 'Home']) await page.keyboard.press(key);
   }
-  await page.waitForTimeout(500);
+  // What they asked for is drawn: whatever that takes to the GPU is there.
+  await page.locator('[role=application][aria-busy=false]').first().waitFor({ timeout: LOAD_TIMEOUT_MS });
   return (await uploaded()) - before;
 }
 

@@ -1,5 +1,6 @@
 // The preview as its users know it: the view, its sliders, legend, facts of a segment, the file's text.
 import { expect, type Locator, type Page } from '@playwright/test';
+import type { Panel } from './panel.ts';
 
 export class Viewer {
   readonly page: Page;
@@ -146,6 +147,14 @@ export class Viewer {
     }
     throw new Error('the picture does not settle');
   }
+}
+
+/** Drops a file on the page and waits until it is read. */
+export async function inView(panel: Panel, path: string): Promise<Viewer> {
+  const viewer = new Viewer(panel.page);
+  await panel.drop(path);
+  await viewer.ready();
+  return viewer;
 }
 
 const OVER_VIEW = '.over-left, .legend, .segment-card, .hover-note, .empty';

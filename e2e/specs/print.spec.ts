@@ -10,6 +10,8 @@ import { endOf } from '../serial/gcode.ts';
 const FILE = 'test-part-small.gcode';
 /** A step of X and Y is 0.0125 mm; a place is a whole number of steps away from the one in the file. */
 const PLACE_ERROR_MM = 0.02;
+/** A switch is looked at now and then: from one homing to the next a step more or less is made until it is seen. */
+const HOMING_SPREAD = 1;
 const AXES = ['X', 'Y', 'Z'] as const;
 
 const place = (record: VirtualState, axis: (typeof AXES)[number]): number =>
@@ -20,7 +22,7 @@ test('a dropped file is printed to its end, step for step', async ({ panel }) =>
   const gcode = readFileSync(sample(FILE));
   const plan = nativePlan(sample(FILE));
 
-  // What homing alone takes: the plan leaves it out, and the device is the same each time it is switched on.
+  // What homing alone takes, which the plan leaves out. The device is the same each time it is switched on.
   await panel.connectVirtual();
   await panel.home();
   const homed = await panel.record();
@@ -41,8 +43,12 @@ test('a dropped file is printed to its end, step for step', async ({ panel }) =>
   const record = await panel.record();
   const motors = Object.keys(plan.motors);
   expect(motors.sort()).toEqual(['extruder', 'stepper_x', 'stepper_y', 'stepper_z']);
-  const expected = motors.map((name) => [name, (plan.motors[name]?.steps ?? 0) + (homing[name] ?? 0)]);
-  expect(pulsesOf(record)).toEqual(Object.fromEntries(expected));
+  const pulses = pulsesOf(record);
+  for (const name of motors) {
+    const expected = (plan.motors[name]?.steps ?? 0) + (homing[name] ?? 0);
+    const spread = name === 'extruder' ? 0 : HOMING_SPREAD;
+    expect(Math.abs((pulses[name] ?? 0) - expected), `steps of ${name}`).toBeLessThanOrEqual(spread);
+  }
 
   const ends = endOf(gcode.toString());
   for (const [index, axis] of AXES.entries()) {

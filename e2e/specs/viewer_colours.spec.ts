@@ -1,8 +1,9 @@
 // What the view is coloured by, what the colours mean, and which features are there at all.
 import { readFileSync } from 'node:fs';
 import { expect, test } from '../fixtures/files.ts';
+import { BEFORE_BEADS } from '../fixtures/gcode.ts';
 import { sample } from '../pages/panel.ts';
-import { Viewer } from '../pages/viewer.ts';
+import { inView, Viewer } from '../pages/viewer.ts';
 
 const MODES = [
   'Layer height',
@@ -19,9 +20,7 @@ const MODES = [
 const LARGE_BYTES = 12e6;
 
 test('features have their shares of time and filament, and can be taken away', async ({ panel, page }) => {
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part.gcode'));
   const row = viewer.legend.getByRole('row').filter({ hasText: 'Outer wall' });
   await expect(row.getByRole('cell')).toHaveText([/^\d+:\d\d$/, /^\d+ %$/, /^\d\.\d\d m$/]);
   const times = await viewer.legend.getByRole('row').getByRole('cell').nth(1).allInnerTexts();
@@ -36,11 +35,9 @@ test('features have their shares of time and filament, and can be taken away', a
   expect((await viewer.picture()).equals(without)).toBe(false);
 });
 
-test('each mode has its colours, and those that are measured their limits', async ({ panel, page }) => {
+test('each mode has its colours, and those that are measured their limits', async ({ panel }) => {
   test.setTimeout(120_000);
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part.gcode'));
   const least = viewer.legend.getByRole('textbox', { name: /^Least/ });
   const greatest = viewer.legend.getByRole('textbox', { name: /^Greatest/ });
   const seen = [await viewer.picture()];
@@ -103,11 +100,9 @@ test('temperature, fan and tools have the colours of what the file sets', async 
   await expectNew('tool');
 });
 
-test('what the planner has not worked out yet is said to be computing', async ({ panel, page, makeFile }) => {
+test('what the planner has not worked out yet is said to be computing', async ({ panel, makeFile }) => {
   test.setTimeout(120_000);
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part-small.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part-small.gcode'));
   await viewer.colourBy.selectOption('Acceleration');
   const part = readFileSync(sample('test-part-small.gcode'), 'utf8');
   await panel.look(makeFile('large.gcode', part.repeat(Math.ceil(LARGE_BYTES / part.length))));
@@ -118,9 +113,7 @@ test('what the planner has not worked out yet is said to be computing', async ({
 });
 
 test('the scale has the colours that the view has in its theme', async ({ panel, page }) => {
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part-small.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part-small.gcode'));
   await viewer.colourBy.selectOption('Line width');
   const bar = viewer.legend.locator('.scale-bar');
   const ramp = (): Promise<string> => bar.evaluate((one) => getComputedStyle(one).backgroundImage);
@@ -132,9 +125,7 @@ test('the scale has the colours that the view has in its theme', async ({ panel,
 });
 
 test('the choice is kept for the next visit', async ({ panel, page }) => {
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part-small.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part-small.gcode'));
   await viewer.colourBy.selectOption('Line width');
   await page.reload();
   await panel.drop(sample('test-part-small.gcode'));
@@ -143,20 +134,7 @@ test('the choice is kept for the next visit', async ({ panel, page }) => {
 });
 
 /** Three beads: hotter from the second on, with the fan and another tool from the third on. */
-const TWO_TOOLS = `G28
-G90
-M82
-M104 S200
-M109 S200
-G92 E0
-;LAYER_CHANGE
-;Z:0.2
-;HEIGHT:0.2
-G1 Z0.2 F600
-;TYPE:External perimeter
-;WIDTH:0.45
-G1 X90 Y90 F6000
-G1 X110 Y90 E10 F1200
+const TWO_TOOLS = `${BEFORE_BEADS}G1 X110 Y90 E10 F1200
 M104 S230
 G1 X110 Y110 E20
 M106 S255

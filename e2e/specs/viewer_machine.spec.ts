@@ -1,7 +1,7 @@
 // Where one looks from, how, and a picture to keep; the machine around the part.
 import { expect, test } from '../fixtures/files.ts';
 import { sample } from '../pages/panel.ts';
-import { Viewer } from '../pages/viewer.ts';
+import { inView, Viewer } from '../pages/viewer.ts';
 
 /** The page asks so many times before it gives up. */
 const PICTURE_TRIES = 3;
@@ -9,9 +9,7 @@ const PNG_BEGINNING = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0
 
 test('the view is turned by buttons and keys, with and without perspective', async ({ panel, page }) => {
   test.setTimeout(240_000);
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part.gcode'));
   const seen: Buffer[] = [];
   const expectNew = async (what: string): Promise<void> => {
     const now = await viewer.picture();
@@ -37,9 +35,7 @@ test('the view is turned by buttons and keys, with and without perspective', asy
 
 test('the part stays in view as long as nobody has come nearer', async ({ panel, page }) => {
   test.setTimeout(90_000);
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part.gcode'));
   const legend = viewer.legend.getByText('Colours', { exact: true });
   const beside = await viewer.picture();
   await viewer.view.focus();
@@ -53,10 +49,56 @@ test('the part stays in view as long as nobody has come nearer', async ({ panel,
   expect((await viewer.picture()).equals(alone), 'without the legend').toBe(true);
 });
 
+test.describe('while the file is still coming', () => {
+  // The page's main thread carries here what it never does otherwise.
+  test.use({ areTasksJudged: false });
+  test('what was moved stays as it is', async ({ panel, page }) => {
+    test.setTimeout(90_000);
+    // The end of the geometry is on its way to the view as long as the test likes.
+    await page.addInitScript(() => {
+      window.Worker = class extends Worker {
+        override postMessage(
+          message: { readonly type?: string; readonly port?: MessagePort },
+          transfer: Transferable[] | StructuredSerializeOptions = [],
+        ): void {
+          const { type, port: source } = message;
+          if (type !== 'source' || !source) return super.postMessage(message, transfer as Transferable[]);
+          const { port1, port2: port } = new MessageChannel();
+          const held: unknown[] = [];
+          let isHolding = true;
+          source.onmessage = ({ data }: MessageEvent<{ readonly request: { readonly type: string } }>) => {
+            if (isHolding && (held.length > 0 || data.request.type === 'end')) held.push(data);
+            else port1.postMessage(data);
+          };
+          const built = new Promise<void>((resolve) => {
+            this.addEventListener('message', ({ data }: MessageEvent<{ readonly type: string }>) => {
+              if (data.type === 'built') resolve();
+            });
+          });
+          Object.assign(window, {
+            letGo: () => {
+              isHolding = false;
+              for (const one of held) port1.postMessage(one);
+              return built;
+            },
+          });
+          super.postMessage({ type, port }, [port]);
+        }
+      };
+    });
+    await panel.open();
+    const viewer = await inView(panel, sample('test-part-small.gcode'));
+    await viewer.view.focus();
+    await page.keyboard.press('+');
+    await page.evaluate(() => (window as unknown as { letGo(): Promise<void> }).letGo());
+    const nearer = await viewer.picture();
+    await page.keyboard.press('Home');
+    expect((await viewer.picture()).equals(nearer), 'it was not put to see all').toBe(false);
+  });
+});
+
 test('a picture of the view is kept as PNG', async ({ panel, page }) => {
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part.gcode'));
   await viewer.picture();
   // In full detail and large: without a graphics card that takes its time.
   test.setTimeout(150_000);
@@ -89,9 +131,7 @@ test('that no picture could be made is said, and tried again', async ({ panel, p
     };
   }, PICTURE_TRIES);
   await panel.open();
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part-small.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part-small.gcode'));
   await viewer.button('Save a picture').focus();
   await page.keyboard.press('Enter');
   const notices = page.getByRole('status', { name: 'Notices' });
@@ -107,9 +147,7 @@ test.describe('by touch', () => {
   test.use({ hasTouch: true });
   test('one finger turns the view, two come nearer, a tap chooses', async ({ panel, page }) => {
     test.setTimeout(90_000);
-    const viewer = new Viewer(page);
-    await panel.drop(sample('test-part.gcode'));
-    await viewer.ready();
+    const viewer = await inView(panel, sample('test-part.gcode'));
     const session = await page.context().newCDPSession(page);
     const touch = async (type: 'touchStart' | 'touchMove' | 'touchEnd', ...xs: number[]): Promise<void> => {
       const touchPoints = xs.map((dx, id) => ({ x: x + dx, y, id }));

@@ -2,7 +2,7 @@
 import { readFileSync } from 'node:fs';
 import { expect, test } from '../fixtures/files.ts';
 import { type Panel, sample } from '../pages/panel.ts';
-import { Viewer } from '../pages/viewer.ts';
+import { inView, Viewer } from '../pages/viewer.ts';
 
 const PLACE = 'x_count: 3\ny_count: 3\nmin_x: 20\nmax_x: 280\nmin_y: 20\nmax_y: 280\n';
 const MESHES = `
@@ -29,10 +29,8 @@ async function useMachine(panel: Panel, path: string): Promise<void> {
 
 test('the mesh that is in force is shown as a surface', async ({ panel, page, makeFile }) => {
   test.setTimeout(120_000);
-  const viewer = new Viewer(page);
+  const viewer = await inView(panel, sample('test-part-small.gcode'));
   const part = viewer.region.getByRole('region', { name: 'Bed mesh of the machine' });
-  await panel.drop(sample('test-part-small.gcode'));
-  await viewer.ready();
   await expect(part).toHaveCount(0);
   await useMachine(panel, makeFile('bent.cfg', readFileSync(sample('printer.cfg'), 'utf8') + MESHES));
   await viewer.ready();
@@ -62,6 +60,33 @@ test('the mesh that is in force is shown as a surface', async ({ panel, page, ma
   await expect(part).toContainText('“cold” of the machine file; it is not in force.');
   await viewer.checkbox('Bed mesh').uncheck();
   await expect(part).not.toContainText('cold');
+});
+
+test('the mesh is to be seen without a file, too', async ({ panel, page, makeFile }) => {
+  test.setTimeout(90_000);
+  const viewer = new Viewer(page);
+  await expect(viewer.checkbox('Bed mesh')).toHaveCount(0);
+  await useMachine(panel, makeFile('bent.cfg', readFileSync(sample('printer.cfg'), 'utf8') + MESHES));
+  /** What is on the screen in the middle of the view, whatever lies over it. */
+  const middle = async (): Promise<Buffer> => {
+    const { x, y } = await viewer.middle();
+    await viewer.picture();
+    return await page.screenshot({ clip: { x: x - 40, y: y - 25, width: 80, height: 50 } });
+  };
+  const plain = await middle();
+  await viewer.checkbox('Bed mesh').focus();
+  await page.keyboard.press('Space');
+  const part = viewer.region.getByRole('region', { name: 'Bed mesh of the machine' });
+  await expect(part).toContainText('“cold” of the machine file; it is not in force.');
+  const cold = await middle();
+  expect(cold.equals(plain), 'the surface is seen').toBe(false);
+  await part.getByRole('combobox', { name: 'Mesh' }).selectOption('warm');
+  expect((await middle()).equals(cold), 'another surface').toBe(false);
+  // What asks for a file has made room for it.
+  const { y } = await viewer.middle();
+  const invitation = await viewer.region.getByText('Drop a G-code file here').boundingBox();
+  expect(invitation?.y).toBeGreaterThan(y + 60);
+  await expect(viewer.button('Choose a file')).toBeInViewport({ ratio: 1 });
 });
 
 /** Where a square bed that fills the view from above has its corner, and far away from any bed. */

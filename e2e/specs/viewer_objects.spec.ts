@@ -1,6 +1,6 @@
 // The objects that a file names are listed, and each can be made to stand out or taken away; its pictures are shown.
 import { expect, test } from '../fixtures/files.ts';
-import { Viewer } from '../pages/viewer.ts';
+import { inView, Viewer } from '../pages/viewer.ts';
 
 const square = (x: number, e: number): string =>
   [`G1 X${x} Y90 F6000`, `G1 X${x + 20} Y90 E${e}`, `Y110 E${e + 1}`, `X${x} E${e + 2}`, `Y90 E${e + 3}`]
@@ -56,11 +56,9 @@ for (const [dialect, gcode] of [
 const PNG =
   'iVBORw0KGgoAAAANSUhEUgAAACAAAAAgCAIAAAD8GO2jAAAAK0lEQVR42u3NAQEAAAjDIO1f+obQg2KQ0ul2zgQCgUAgEAgEAoFAIBAIvgUfbgFAwCTl4QAAAABJRU5ErkJggg==';
 
-test('the picture that a slicer put into the file is shown', async ({ panel, page, makeFile }) => {
-  const viewer = new Viewer(page);
+test('the picture that a slicer put into the file is shown', async ({ panel, makeFile }) => {
   const thumbnail = `; thumbnail begin 32x32 ${PNG.length}\n; ${PNG}\n; thumbnail end\n`;
-  await panel.drop(makeFile('pictured.gcode', `${thumbnail}${KLIPPER}`));
-  await viewer.ready();
+  await inView(panel, makeFile('pictured.gcode', `${thumbnail}${KLIPPER}`));
   const image = panel.job.getByRole('img', { name: 'The print, as its slicer drew it' });
   await expect(image).toBeVisible();
   await expect.poll(() => image.evaluate((one: HTMLImageElement) => one.naturalWidth)).toBe(32);

@@ -3,7 +3,7 @@ import { readFileSync } from 'node:fs';
 import { gzipSync } from 'node:zlib';
 import { expect, test } from '../fixtures/files.ts';
 import { sample } from '../pages/panel.ts';
-import { Viewer } from '../pages/viewer.ts';
+import { inView, Viewer } from '../pages/viewer.ts';
 
 /** So many lines that their rows are taller than any element of a browser. */
 const LONG_LINES = 2_200_000;
@@ -11,11 +11,9 @@ const LONG_LINES = 2_200_000;
 const numberIn = (text: string): number => Number(/Line ([\d,]+)/.exec(text)?.[1]?.replaceAll(',', ''));
 
 test('a click finds the segment, its facts and its line; the text goes there', async ({ panel, page }) => {
-  const viewer = new Viewer(page);
   const path = sample('test-part.gcode');
   const lines = readFileSync(path, 'utf8').split('\n');
-  await panel.drop(path);
-  await viewer.ready();
+  const viewer = await inView(panel, path);
   await viewer.openText();
   await viewer.button('Top').click();
   const without = await viewer.picture();
@@ -39,9 +37,7 @@ test('a click finds the segment, its facts and its line; the text goes there', a
 });
 
 test('a pointer that rests on a segment is told what it is on', async ({ panel, page }) => {
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part.gcode'));
-  await viewer.ready();
+  const viewer = await inView(panel, sample('test-part.gcode'));
   await viewer.button('Top').click();
   await viewer.picture();
   const { x, y } = await viewer.middle();
@@ -52,11 +48,9 @@ test('a pointer that rests on a segment is told what it is on', async ({ panel, 
 });
 
 test('a line that is chosen by key is shown as the last one made', async ({ panel, page }) => {
-  const viewer = new Viewer(page);
   const path = sample('test-part.gcode');
   const lines = readFileSync(path, 'utf8').split('\n');
-  await panel.drop(path);
-  await viewer.ready();
+  const viewer = await inView(panel, path);
   await viewer.openText();
   const whole = await viewer.picture();
   const field = viewer.region.getByRole('textbox', { name: /^Line \(of/ });
@@ -81,10 +75,8 @@ test('a line that is chosen by key is shown as the last one made', async ({ pane
   await expect(chosen).toHaveAttribute('aria-posinset', String(lines.length - 1));
 });
 
-test('moves that are played take the text with them', async ({ panel, page }) => {
-  const viewer = new Viewer(page);
-  await panel.drop(sample('test-part.gcode'));
-  await viewer.ready();
+test('moves that are played take the text with them', async ({ panel }) => {
+  const viewer = await inView(panel, sample('test-part.gcode'));
   await viewer.openText();
   await viewer.button('Play the moves').click();
   const chosen = viewer.text.getByRole('option', { selected: true });

@@ -1,4 +1,26 @@
-// Work in pieces, each a task of its own: between two of them the page answers its user. Knows nothing of the pieces.
+// Work in pieces, each a task of its own: between two of them the page answers its user; and work that waits until the page
+// has shown what is new. Knows nothing of the pieces.
+
+/** A page that is not seen shows nothing: after so long nobody waits for its pictures, in ms. */
+const PICTURES_MS = 500;
+
+/** Calls back once the page has shown so many pictures of itself, or would have. */
+export function afterPictures(count: number, act: () => void): void {
+  let left = count;
+  const end = (): void => {
+    clearTimeout(timer);
+    left = -1;
+    act();
+  };
+  const timer = setTimeout(end, PICTURES_MS);
+  const next = (): void => {
+    if (left < 0) return;
+    left -= 1;
+    if (left < 0) end();
+    else requestAnimationFrame(next);
+  };
+  if (typeof requestAnimationFrame === 'function') next();
+}
 
 /** Carries out steps one after the other, each in a task of its own but the first, which is done at once. */
 export function inTasks(...steps: readonly (() => void)[]): void {

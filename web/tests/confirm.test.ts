@@ -3,27 +3,10 @@ import { beforeEach, expect, test } from 'vitest';
 import type { Remark, Summary } from '../src/preview/protocol';
 import { confirmGroup, consent, groups, rest, unconfirmed } from '../src/state/confirm';
 import { confirmed, summary } from '../src/state/preview';
+import { summaryOf } from './fake_summary';
 
 const remark = (line: number, text: string): Remark => ({ line, text, severity: 'blocking' });
-const found = (blocking: readonly Remark[], dropped = 0): Summary => ({
-  errors: [],
-  blocking,
-  remarks: [],
-  dropped,
-  lines: 5000,
-  moves: 0,
-  filament: 0 as Summary['filament'],
-  bounds: null,
-  vertices: 0,
-  layers: [],
-  time: null,
-  features: [],
-  objects: [],
-  tools: [],
-  leftOut: 0,
-  clamped: 0,
-  generator: null,
-});
+const found = (blocking: readonly Remark[], dropped = 0): Summary => summaryOf({ blocking, dropped });
 
 beforeEach(() => {
   confirmed.value = new Set();

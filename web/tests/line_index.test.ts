@@ -44,6 +44,25 @@ test('the places stay few and their lines near, however many lines there are', (
   expect(index.before(50_000).offset).toBe(index.before(50_000).line - 1);
 });
 
+test('only line feeds end lines, at any place in memory', () => {
+  const text = '\u000b\n\u0009\u000a\u0000\n\u008a\n\n\n\n\nX\u010a\n'.repeat(40);
+  const bytes = bytesOf(text);
+  const ends = bytes.filter((byte) => byte === 10).length;
+  for (let shift = 0; shift < 9; shift += 1) {
+    const memory = new Uint8Array(bytes.length + shift);
+    memory.set(bytes, shift);
+    for (const stride of [1, 3, 1024]) {
+      const index = new LineIndex(stride, 1000);
+      index.add(memory.subarray(shift, shift + 5));
+      index.add(memory.subarray(shift + 5));
+      expect(index.lines).toBe(ends);
+      const { line, offset } = index.before(ends);
+      expect(bytes.subarray(0, offset).filter((byte) => byte === 10)).toHaveLength(line - 1);
+      expect(offset === 0 || bytes[offset - 1] === 10).toBe(true);
+    }
+  }
+});
+
 test('an empty file, and one without an end of its last line', () => {
   expect(new LineIndex().lines).toBe(0);
   expect(new LineIndex().before(1)).toEqual({ line: 1, offset: 0 });

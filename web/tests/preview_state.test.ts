@@ -1,6 +1,7 @@
 // A preview worker that stops: said as what it is, replaced, and nobody waits for it in vain.
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import type { ConfigReport, FromPreview, ToPreview } from '../src/preview/protocol';
+import { summaryOf } from './fake_summary';
 import { type FakeWorker, fakeWorkers } from './fake_worker';
 
 type PreviewWorker = FakeWorker<FromPreview, ToPreview>;
@@ -54,4 +55,20 @@ test('one that keeps stopping is given up, and says so to whoever asks', async (
   expect([page.reading.value, page.failure.value?.code]).toEqual([null, 'preview-died']);
   expect(page.failure.value?.happened).not.toContain('undefined');
   expect((await page.checkConfig('')).machine).toBeNull();
+});
+
+test('what a print waits for is said, as far as the file has come', async () => {
+  const { obstacle } = await import('../src/panel/obstacle');
+  page.openFile(new Blob(['G28']), 'part.gcode');
+  expect(obstacle.value).toBe('The file is still being read.');
+  workers[0]?.say({ kind: 'outline', job: 1, outline: summaryOf() });
+  expect(obstacle.value).toContain('the planner is still checking');
+  workers[0]?.say({ kind: 'summary', job: 1, summary: summaryOf() });
+  expect(obstacle.value).not.toContain('still');
+});
+
+test('the planner is let go once the outline is shown', async () => {
+  page.openFile(new Blob(['G28']), 'part.gcode');
+  workers[0]?.say({ kind: 'outline', job: 1, outline: summaryOf() });
+  await vi.waitFor(() => expect(workers[0]?.sent.at(-1)).toEqual({ kind: 'plan', job: 1 }));
 });

@@ -1,6 +1,30 @@
-import { expect, test } from 'vitest';
+import { afterEach, expect, test, vi } from 'vitest';
 import { dateFormat } from '../src/dates';
-import { inTasks } from '../src/tasks';
+import { afterPictures, inTasks } from '../src/tasks';
+
+afterEach(() => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+test('what waits for pictures of the page comes behind them, once, and where there are none it comes all the same', () => {
+  vi.useFakeTimers();
+  const frames: (() => void)[] = [];
+  vi.stubGlobal('requestAnimationFrame', (callback: () => void) => frames.push(callback));
+  const done: string[] = [];
+  afterPictures(2, () => done.push('seen'));
+  frames.shift()?.();
+  expect(done).toEqual([]);
+  frames.shift()?.();
+  vi.runAllTimers();
+  expect([done, frames]).toEqual([['seen'], []]);
+
+  afterPictures(2, () => done.push('unseen'));
+  vi.runAllTimers();
+  frames.shift()?.();
+  vi.runAllTimers();
+  expect([done, frames]).toEqual([['seen', 'unseen'], []]);
+});
 
 test('the first step is done at once, the others in tasks of their own', async () => {
   const done: string[] = [];

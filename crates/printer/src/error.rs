@@ -345,7 +345,7 @@ impl PrinterError {
         if self.detail.is_empty() {
             format!("{place}{}.", self.code.what_happened())
         } else {
-            format!("{place}{}: {}.", self.code.what_happened(), self.detail)
+            format!("{place}{}: {}.", self.code.what_happened(), self.detail.trim_end_matches('.'))
         }
     }
 
@@ -419,6 +419,8 @@ mod tests {
     fn the_detail_is_part_of_what_happened() {
         let error = PrinterError::new(ErrorCode::NotHomed, "axis X").at_line(12);
         assert_eq!(error.to_string(), "Line 12: A move was asked for before the machine was homed: axis X.");
+        let error = PrinterError::new(ErrorCode::InvalidGcode, "`Y` has no number.");
+        assert_eq!(error.to_string(), "A line of the file cannot be read as G-code: `Y` has no number.");
         let error = PrinterError::from(ErrorCode::NotHomed);
         assert_eq!(error.to_string(), "A move was asked for before the machine was homed.");
     }

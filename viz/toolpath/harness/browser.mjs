@@ -25,12 +25,37 @@ export async function withBrowser(body) {
   }
 }
 
-/** Waits for a full picture drawn after the frame number `since`. */
-export const drawnAtRest = (page, since) =>
-  page.waitForFunction(
-    (n) => window.harness.ready && window.harness.frames.slice(n).some((frame) => frame.kind === 'full'),
-    since,
-    { timeout: 120_000 },
-  );
+/** Waits until the view shows all that it was asked for in full, and the browser shows that. */
+export async function drawnAtRest(page) {
+  await page.waitForFunction(() => window.harness?.ready);
+  await page.evaluate(() => {
+    const { host, latest } = window.harness;
+    latest.delete('settled');
+    host.settle(1);
+  });
+  await page.waitForFunction(() => window.harness.latest.has('settled'), null, { timeout: 120_000 });
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+}
+
+/** Takes the view's context away and gives it one again, each when the view knows of the one before. */
+export async function loseContext(page) {
+  for (const [call, event] of [
+    ['loseContext', 'contextLost'],
+    ['restoreContext', 'contextRestored'],
+  ]) {
+    await page.evaluate(
+      ([name, type]) => {
+        const { latest, frames } = window.harness;
+        latest.delete(type);
+        frames.length = 0;
+        const gl = document.querySelector('#view').getContext('webgl2');
+        window.losing ??= gl.getExtension('WEBGL_lose_context');
+        window.losing[name]();
+      },
+      [call, event],
+    );
+    await page.waitForFunction((type) => window.harness.latest.has(type), event, { timeout: 30_000 });
+  }
+}
 
 export const frameCount = (page) => page.evaluate(() => window.harness.frames.length);

@@ -2,7 +2,7 @@
 // What the view does in a browser, apart from what it looks like: `node harness/checks.mjs`. The harness must be built.
 // The view draws on the main thread here, so that its calls of WebGL can be counted.
 import assert from 'node:assert/strict';
-import { withBrowser } from './browser.mjs';
+import { loseContext, withBrowser } from './browser.mjs';
 import { atRest, difference, drawn } from './compare.mjs';
 
 const SIZE = { width: 320, height: 240 };
@@ -135,21 +135,7 @@ async function keepsPictures(page) {
 async function comesBack(page) {
   for (const name of ['colour-layer-time', 'colour-speed', 'mesh']) {
     const before = await drawn(page, name, 'light');
-    await page.evaluate(async () => {
-      const { latest, frames } = window.harness;
-      const gl = document.querySelector('#view').getContext('webgl2');
-      const lose = gl.getExtension('WEBGL_lose_context');
-      const until = async (type) => {
-        while (!latest.get(type)) await new Promise((resolve) => requestAnimationFrame(resolve));
-      };
-      latest.delete('contextLost');
-      latest.delete('contextRestored');
-      lose.loseContext();
-      await until('contextLost');
-      frames.length = 0;
-      lose.restoreContext();
-      await until('contextRestored');
-    });
+    await loseContext(page);
     const share = await difference(page, before, await atRest(page));
     assert.ok(share < 0.5, `${name} is as before the context was lost: ${share} ‰ differ`);
   }

@@ -12,6 +12,7 @@ import {
   type VertexHeader,
   type ViewEvent,
 } from '../src/index';
+import { SHOW_ALL } from '../src/shown';
 import { CASES } from './cases';
 import { synthetic } from './synthetic';
 import { HEADER, type Made } from './writer';
@@ -69,20 +70,7 @@ function reset(theme: 'light' | 'dark'): void {
   host.setColour('feature');
   host.setColourRange('speed', null);
   host.setProjection('perspective');
-  host.show({
-    layerFrom: 0,
-    layerTo: Number.MAX_SAFE_INTEGER,
-    vertexFrom: null,
-    vertexTo: null,
-    hiddenObjects: [],
-    travel: false,
-    wipes: false,
-    retractions: false,
-    seams: false,
-    toolChanges: false,
-    pauses: false,
-    hiddenFeatures: [],
-  });
+  host.show(SHOW_ALL);
 }
 
 window.harness = {

@@ -3,7 +3,7 @@
 // The browser is that of the browser tests. Software GL, so that every machine gives the same pictures.
 import { mkdirSync } from 'node:fs';
 import { join } from 'node:path';
-import { DIST, drawnAtRest, frameCount, withBrowser } from './browser.mjs';
+import { DIST, drawnAtRest, frameCount, loseContext, withBrowser } from './browser.mjs';
 
 const out = process.argv[2] ?? join(DIST, 'pictures');
 const only = process.argv[3];
@@ -16,15 +16,13 @@ async function open(browser, url, query, size = { width: 1200, height: 800 }) {
   );
   page.on('pageerror', (error) => console.log(`  [page] ${error}`));
   await page.goto(`${url}?${query}`);
-  await drawnAtRest(page, 0);
+  await drawnAtRest(page);
   return page;
 }
 
 async function act(page, name, body) {
-  const since = await frameCount(page);
   await page.evaluate(body);
-  await drawnAtRest(page, since);
-  await page.waitForTimeout(120);
+  await drawnAtRest(page);
   await page.screenshot({ path: join(out, `${name}.png`) });
 }
 
@@ -58,16 +56,8 @@ async function pictures(browser, url) {
 async function robustness(browser, url) {
   const page = await open(browser, url, 'main=1&segments=60000&theme=dark');
   await page.screenshot({ path: join(out, 'main-thread.png') });
-  const since = await frameCount(page);
-  await page.evaluate(async () => {
-    const gl = document.querySelector('#view').getContext('webgl2');
-    const lose = gl.getExtension('WEBGL_lose_context');
-    lose.loseContext();
-    await new Promise((resolve) => setTimeout(resolve, 300));
-    lose.restoreContext();
-  });
-  await drawnAtRest(page, since);
-  await page.waitForTimeout(120);
+  await loseContext(page);
+  await drawnAtRest(page);
   await page.screenshot({ path: join(out, 'restored.png') });
   console.log(
     'context lost and restored:',
@@ -80,19 +70,18 @@ async function measure(browser, url) {
   for (const segments of [200_000, 1_000_000]) {
     const page = await browser.newPage({ viewport: { width: 1200, height: 800 } });
     await page.goto(`${url}?segments=${segments}`);
-    await drawnAtRest(page, 0);
-    await page.waitForTimeout(1500);
+    await drawnAtRest(page);
     const rest = await page.evaluate(() => window.harness.frames.filter((f) => f.kind === 'full').at(-1));
     const since = await frameCount(page);
     await page.evaluate(async () => {
       for (let step = 0; step < 120; step++) {
         window.harness.host.orbit(4, step % 2);
+        // As often as a pointer moves.
         await new Promise((resolve) => setTimeout(resolve, 16));
       }
     });
     const moving = await page.evaluate((n) => window.harness.frames.slice(n), since);
     await page.screenshot({ path: join(out, `moving-${segments}.png`) });
-    await drawnAtRest(page, since);
     const times = moving.map((f) => f.longestMs).sort((a, b) => a - b);
     const at = (p) => times[Math.min(Math.floor(times.length * p), times.length - 1)]?.toFixed(0);
     const vertices = await page.evaluate(() => window.harness.vertexCount);

@@ -60,7 +60,7 @@ export class FlatView implements View {
   #palette: Palette = PALETTES.light;
   #mode: ColourMode = 'feature';
   #bed: Bed | null = null;
-  /** All of it is in view, and is to stay so. */
+  /** All of it is in view, and is to stay so until the user moves it. */
   #isFitted = false;
   #place: Place = { atMm: [0, 0], scale: 2 };
   #size: ViewSizePx = { width: 1, height: 1, ratio: 1 };
@@ -105,7 +105,7 @@ export class FlatView implements View {
   }
 
   end(): void {
-    this.#restart();
+    this.#seeAll();
   }
 
   clear(): void {
@@ -137,10 +137,8 @@ export class FlatView implements View {
 
   setNozzle(at: Vec3 | null): void {
     this.#nozzle = at?.every(Number.isFinite) ? at : null;
-    if (this.#nozzle && this.#follows) {
+    if (this.#nozzle && this.#follows)
       this.#place = { ...this.#place, atMm: [this.#nozzle[0], this.#nozzle[1]] };
-      this.#isFitted = false;
-    }
     this.#restart();
   }
 
@@ -193,6 +191,7 @@ export class FlatView implements View {
   }
 
   fit(): void {
+    this.#isFitted = true;
     const box = this.#store?.box() ?? (this.#bed && bedBox(this.#bed));
     if (!box) return;
     const [width, height] = [box.max[0] - box.min[0], box.max[1] - box.min[1]];
@@ -200,7 +199,6 @@ export class FlatView implements View {
       MARGIN * Math.min(this.#size.width / Math.max(width, 1), this.#size.height / Math.max(height, 1));
     const middle = (axis: 0 | 1): number => (box.min[axis] + box.max[axis]) / 2;
     this.#place = { scale: Math.min(Math.max(scale, SCALE_MIN), SCALE_MAX), atMm: [middle(0), middle(1)] };
-    this.#isFitted = true;
     this.#restart();
   }
 
@@ -212,8 +210,7 @@ export class FlatView implements View {
     this.#size = size;
     this.#canvas.width = Math.max(1, Math.round(size.width * size.ratio));
     this.#canvas.height = Math.max(1, Math.round(size.height * size.ratio));
-    if (this.#isFitted) this.fit();
-    else this.#restart();
+    this.#seeAll();
   }
 
   slice(first: VertexIndex, end: VertexIndex, id: number): void {
@@ -252,6 +249,13 @@ export class FlatView implements View {
   dispose(): void {
     this.#isOver = true;
     this.#store = null;
+  }
+
+  /** All that there is by now, unless the user has moved it. */
+  #seeAll(): void {
+    if (this.#isFitted) this.fit();
+    this.setFollow(this.#follows);
+    this.#restart();
   }
 
   /** The topmost layer that is shown, or the part of it that is. */

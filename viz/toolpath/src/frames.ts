@@ -57,6 +57,13 @@ export interface FrameReport {
 const REST_MS = 140;
 /** The same after more of a file has come. */
 const GROWTH_REST_MS = 1500;
+/** While a file comes, the picture follows this often: first soon, then not so often that drawing delays the reading. */
+const GROWTH_MS: Ms = 150;
+const GROWTH_MAX_MS: Ms = 1000;
+const GROWTH_SLOWER = 1.5;
+/** Where pictures are drawn by the processor, they take it from the reading: a pause is so many times as long as a picture. */
+const GROWTH_PAUSE = 8;
+const GROWTH_PAUSE_MAX_MS: Ms = 5000;
 const POLL_MS = 2;
 /** How far a full picture is is told this often. */
 const PART_MS = 500;
@@ -87,6 +94,15 @@ export class FrameLoop {
   #pictureSegments = 0;
   #longest: Ms = 0;
   #partTold: Ms = -Infinity;
+  /** The file is thought to grow until then. */
+  #growsUntil: Ms = -Infinity;
+  /** A picture of what has come is drawn then at the earliest; and how long after that one the next. */
+  #nextGrowth: Ms = -Infinity;
+  #growthMs: Ms = GROWTH_MS;
+  /** What the last quick or full picture took. */
+  #tookMs: Ms = 0;
+  /** Runs while changes are gathered. */
+  #gathering: number | null = null;
   #resting: (() => void)[] = [];
 
   constructor(painter: Painter, clock: FrameClock, report: (report: FrameReport) => void) {
@@ -97,15 +113,44 @@ export class FrameLoop {
 
   /** Something that moves has changed the picture. */
   moved(): void {
-    this.#changed(REST_MS);
+    this.#changed();
   }
 
-  /** The file has grown, and will again: a full picture is not begun between. */
+  /** A file begins: what comes first of it is shown at once. */
+  begins(): void {
+    this.#growsUntil = -Infinity;
+    this.#nextGrowth = -Infinity;
+    this.#growthMs = GROWTH_MS;
+  }
+
+  /** The file has grown, and will again: a picture now and then, and no full one is begun between. */
   grew(): void {
-    this.#changed(GROWTH_REST_MS);
+    const now = this.#clock.now();
+    this.#growsUntil = now + GROWTH_REST_MS;
+    // How long a picture takes, and with it the pause, is known when it is done.
+    if (now < this.#nextGrowth || this.#frame !== null || this.#poll !== null) return;
+    this.#nextGrowth = now + this.#growthMs;
+    this.#growthMs = Math.min(this.#growthMs * GROWTH_SLOWER, GROWTH_MAX_MS);
+    this.#changed();
   }
 
-  #changed(restMs: Ms): void {
+  /** The file grows no more. */
+  ended(): void {
+    this.#growsUntil = -Infinity;
+    this.changed();
+  }
+
+  /** Something has changed that is no movement: more may follow, and where pictures take long all of it is drawn at once. */
+  changed(): void {
+    if (this.#tookMs <= FRAME_TARGET_MS) return this.#changed();
+    this.#picture = 'none';
+    this.#fullWanted = false;
+    this.#gathering ??= this.#clock.setTimer(() => this.#changed(), REST_MS);
+  }
+
+  #changed(): void {
+    if (this.#gathering !== null) this.#clock.clearTimer(this.#gathering);
+    this.#gathering = null;
     if (this.#fullFits()) {
       this.redraw();
       return;
@@ -114,12 +159,26 @@ export class FrameLoop {
     this.#fullWanted = false;
     this.#quickWanted = true;
     this.#schedule();
+    this.#rest(REST_MS);
+  }
+
+  /** The full picture is begun after that, or when the file grows no more. */
+  #rest(delayMs: Ms): void {
     if (this.#timer !== null) this.#clock.clearTimer(this.#timer);
     this.#timer = this.#clock.setTimer(() => {
       this.#timer = null;
+      const wait = this.#growsUntil - this.#clock.now();
+      if (wait > 0) return this.#rest(wait);
       this.#fullWanted = true;
       this.#schedule();
-    }, restMs);
+    }, delayMs);
+  }
+
+  /** A picture has taken so long. */
+  #took(elapsed: Ms): void {
+    this.#tookMs = elapsed;
+    const pause = Math.min(elapsed * GROWTH_PAUSE, GROWTH_PAUSE_MAX_MS);
+    this.#nextGrowth = Math.max(this.#nextGrowth, this.#clock.now() + pause);
   }
 
   /** The picture is to be drawn anew; the old one stays until then. */
@@ -152,11 +211,13 @@ export class FrameLoop {
   /** Draws no more until {@link resume}. */
   pause(): void {
     this.#stopped = true;
-    for (const handle of [this.#timer, this.#poll]) if (handle !== null) this.#clock.clearTimer(handle);
+    for (const handle of [this.#timer, this.#poll, this.#gathering])
+      if (handle !== null) this.#clock.clearTimer(handle);
     if (this.#frame !== null) this.#clock.cancelFrame(this.#frame);
     this.#frame = null;
     this.#timer = null;
     this.#poll = null;
+    this.#gathering = null;
     this.#picture = 'none';
   }
 
@@ -187,6 +248,7 @@ export class FrameLoop {
       const segments = this.#painter.drawQuick(this.#quickBudget.segments);
       this.#await(began, (elapsed) => {
         this.#quickBudget.measured(segments, elapsed);
+        this.#took(elapsed);
         this.#tell({ kind: 'quick', segments, longestMs: elapsed, totalMs: elapsed });
       });
     } else if (this.#fullWanted) {
@@ -228,6 +290,7 @@ export class FrameLoop {
       this.#longest = Math.max(this.#longest, elapsed);
       if (!complete) return this.#tellPart();
       const totalMs = this.#clock.now() - this.#pictureBegan;
+      this.#took(totalMs);
       this.#tell({ kind: 'full', segments: this.#pictureSegments, longestMs: this.#longest, totalMs });
     });
   }
@@ -236,8 +299,12 @@ export class FrameLoop {
     return this.#quickWanted || this.#fullWanted || this.#patchWanted || this.#overlayWanted;
   }
 
+  #isWaiting(): boolean {
+    return this.#timer !== null || this.#gathering !== null;
+  }
+
   #isAtRest(): boolean {
-    return this.#picture === 'complete' && !this.#isWanted() && this.#timer === null;
+    return this.#picture === 'complete' && !this.#isWanted() && !this.#isWaiting();
   }
 
   /** Now and then, how far the full picture is. */
@@ -251,7 +318,7 @@ export class FrameLoop {
   }
 
   #tell(report: Omit<FrameReport, 'more' | 'share'> & { readonly share?: number }): void {
-    this.#report({ share: 1, ...report, more: this.#isWanted() || this.#timer !== null });
+    this.#report({ share: 1, ...report, more: this.#isWanted() || this.#isWaiting() });
     if (!this.#isAtRest()) return;
     for (const callback of this.#resting.splice(0)) callback();
   }

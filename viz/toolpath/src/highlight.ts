@@ -4,8 +4,9 @@
  * It lies in front of everything, so that moving it draws nothing anew. Does not know: which segment, or why. Units: mm,
  * CSS pixels.
  */
-import { BufferAttribute, BufferGeometry, DoubleSide, GLSL3, Mesh, RawShaderMaterial, Scene } from 'three';
+import { BufferAttribute, BufferGeometry, DoubleSide, Scene } from 'three';
 import type { Vec3 } from './camera';
+import { Overlay } from './overlay';
 import { type Palette, rgb } from './palette';
 import type { Mm } from './units';
 
@@ -59,7 +60,7 @@ void main() { colour = vec4(abs(vAcross) > 0.7 ? uEdge : uColour, 1.0); }
 
 export class HighlightObject {
   readonly scene = new Scene();
-  readonly #mesh: Mesh<BufferGeometry, RawShaderMaterial>;
+  readonly #overlay: Overlay;
 
   constructor() {
     const geometry = new BufferGeometry();
@@ -67,63 +68,47 @@ export class HighlightObject {
     geometry.setAttribute('corner', new BufferAttribute(corners, 2));
     // Three.js counts the corners of an attribute named position; here there is none.
     geometry.setDrawRange(0, 6);
-    const material = new RawShaderMaterial({
-      glslVersion: GLSL3,
+    this.#overlay = new Overlay(this.scene, geometry, {
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
       uniforms: {
-        uFrom: { value: [0, 0, 0] },
-        uTo: { value: [0, 0, 0] },
-        uWidth: { value: 0 },
-        uView: { value: [1, 1] },
-        uColour: { value: [0, 0, 0] },
-        uEdge: { value: [0, 0, 0] },
+        uFrom: [0, 0, 0],
+        uTo: [0, 0, 0],
+        uWidth: 0,
+        uView: [1, 1],
+        uColour: [0, 0, 0],
+        uEdge: [0, 0, 0],
       },
       side: DoubleSide,
-      depthTest: false,
-      depthWrite: false,
     });
-    this.#mesh = new Mesh(geometry, material);
-    this.#mesh.frustumCulled = false;
-    this.#mesh.matrixAutoUpdate = false;
-    this.#mesh.visible = false;
-    this.scene.add(this.#mesh);
-    this.scene.matrixWorldAutoUpdate = false;
   }
 
   get isShown(): boolean {
-    return this.#mesh.visible;
+    return this.#overlay.isShown;
   }
 
   /** The segment's ends and its bead's width and height; null shows none. */
   set(
     segment: { readonly from: Vec3; readonly to: Vec3; readonly widthMm: Mm; readonly heightMm: Mm } | null,
   ): void {
-    this.#mesh.visible = segment !== null;
+    this.#overlay.isShown = segment !== null;
     if (!segment) return;
     const middle = ([x, y, z]: Vec3): number[] => [x, y, z - segment.heightMm / 2];
-    this.#put('uFrom', middle(segment.from));
-    this.#put('uTo', middle(segment.to));
-    this.#put('uWidth', segment.widthMm);
+    this.#overlay.set('uFrom', middle(segment.from));
+    this.#overlay.set('uTo', middle(segment.to));
+    this.#overlay.set('uWidth', segment.widthMm);
   }
 
   set palette(palette: Palette) {
-    this.#put('uColour', rgb(palette.highlight));
-    this.#put('uEdge', rgb(palette.background));
+    this.#overlay.set('uColour', [...rgb(palette.highlight)]);
+    this.#overlay.set('uEdge', [...rgb(palette.background)]);
   }
 
   set view(size: { readonly width: number; readonly height: number }) {
-    this.#put('uView', [size.width, size.height]);
+    this.#overlay.set('uView', [size.width, size.height]);
   }
 
-  /** Lets go of what is on the GPU; it comes anew when it is next drawn. */
   release(): void {
-    this.#mesh.geometry.dispose();
-    this.#mesh.material.dispose();
-  }
-
-  #put(name: string, value: unknown): void {
-    const uniform = this.#mesh.material.uniforms[name];
-    if (uniform) uniform.value = value;
+    this.#overlay.release();
   }
 }

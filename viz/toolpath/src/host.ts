@@ -22,7 +22,7 @@ import type { ViewSizePx } from './view';
 export interface ToolpathHostOptions {
   readonly size: ViewSizePx;
   readonly onEvent?: (event: ViewEvent) => void;
-  /** Told of every request from here that changes the picture, but of the nozzle's and the print's, which always move. */
+  /** Told behind every request from here that changes the picture, but of the nozzle's and the print's, which always move. */
   readonly onChange?: () => void;
   /** True: draw on the main thread even where a worker could. */
   readonly mainThread?: boolean;
@@ -185,14 +185,16 @@ export class ToolpathHost {
     if (this.#disposed) return;
     if (this.#worker) this.#post({ type: 'discard', before }, []);
     else this.#source.discard(before);
+    this.#onChange();
   }
 
   send(request: ViewRequest, transfer: Transferable[] = []): void {
     if (this.#disposed) return;
-    if (!NO_CHANGES.has(request.type)) this.#onChange();
     if (this.#worker) this.#post(request, transfer);
     else if (this.#view) carryOut(this.#view, request);
     else if (this.#waiting.length < WAITING_MAX) this.#waiting.push(request);
+    // Behind it: who is told may ask when that is drawn.
+    if (!NO_CHANGES.has(request.type)) this.#onChange();
   }
 
   dispose(): void {

@@ -4,8 +4,9 @@
  * It lies over the picture, in front of everything, so that moving it draws neither path nor bed anew. Does not know:
  * where the nozzle is or how that is known. Units: mm, CSS pixels.
  */
-import { BufferAttribute, BufferGeometry, FrontSide, GLSL3, Mesh, RawShaderMaterial, Scene } from 'three';
+import { BufferAttribute, BufferGeometry, FrontSide, Scene } from 'three';
 import type { Vec3 } from './camera';
+import { Overlay } from './overlay';
 import { type HexColour, rgb } from './palette';
 import { FLAT_FRAGMENT } from './shaders';
 import type { CssPx } from './units';
@@ -72,57 +73,41 @@ export function nozzleTriangles(): { readonly corners: number[]; readonly shades
 
 export class NozzleObject {
   readonly scene = new Scene();
-  readonly #mesh: Mesh<BufferGeometry, RawShaderMaterial>;
+  readonly #overlay: Overlay;
 
   constructor() {
     const { corners, shades } = nozzleTriangles();
     const geometry = new BufferGeometry();
     geometry.setAttribute('position', new BufferAttribute(new Float32Array(corners), 3));
     geometry.setAttribute('shade', new BufferAttribute(new Float32Array(shades), 1));
-    const material = new RawShaderMaterial({
-      glslVersion: GLSL3,
+    this.#overlay = new Overlay(this.scene, geometry, {
       vertexShader: VERTEX,
       fragmentShader: FLAT_FRAGMENT,
-      uniforms: { uColour: { value: [0, 0, 0] }, uAt: { value: [0, 0, 0] }, uSize: { value: 0 } },
+      uniforms: { uColour: [0, 0, 0], uAt: [0, 0, 0], uSize: 0 },
       side: FrontSide,
-      depthTest: false,
-      depthWrite: false,
     });
-    this.#mesh = new Mesh(geometry, material);
-    this.#mesh.frustumCulled = false;
-    this.#mesh.matrixAutoUpdate = false;
-    this.#mesh.visible = false;
-    this.scene.add(this.#mesh);
-    this.scene.matrixWorldAutoUpdate = false;
   }
 
   get isShown(): boolean {
-    return this.#mesh.visible;
+    return this.#overlay.isShown;
   }
 
   /** Where the tip is; null shows none. */
   set at(place: Vec3 | null) {
-    this.#mesh.visible = place !== null;
-    if (place) this.#set('uAt', [...place]);
+    this.#overlay.isShown = place !== null;
+    if (place) this.#overlay.set('uAt', [...place]);
   }
 
   set colour(hex: HexColour) {
-    this.#set('uColour', rgb(hex));
+    this.#overlay.set('uColour', [...rgb(hex)]);
   }
 
   /** What a CSS pixel covers a millimetre away. */
   set pixelAngle(angle: number) {
-    this.#set('uSize', HEIGHT_PX * angle);
+    this.#overlay.set('uSize', HEIGHT_PX * angle);
   }
 
-  /** Lets go of what is on the GPU; it comes anew when it is next drawn. */
   release(): void {
-    this.#mesh.geometry.dispose();
-    this.#mesh.material.dispose();
-  }
-
-  #set(name: string, value: unknown): void {
-    const uniform = this.#mesh.material.uniforms[name];
-    if (uniform) uniform.value = value;
+    this.#overlay.release();
   }
 }

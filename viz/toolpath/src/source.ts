@@ -25,9 +25,7 @@ export class Source {
   /** What comes of jobs before this one is not wanted any more; what is there of them goes. */
   discard(before: number): void {
     if (before <= this.#job) return;
-    this.#job = before;
-    this.#carryOut({ type: 'clear' });
-    this.#carryOut({ type: 'fit' });
+    this.#turnTo(before);
   }
 
   close(): void {
@@ -38,7 +36,14 @@ export class Source {
   #take({ job, request }: SourcedRequest): void {
     if (job < this.#job) return;
     if (job > this.#job && request.type !== 'begin') return;
-    this.#job = job;
+    if (job > this.#job) this.#turnTo(job);
     this.#carryOut(request);
+  }
+
+  /** What is there of jobs before goes, and all that comes is looked at. */
+  #turnTo(job: number): void {
+    this.#job = job;
+    this.#carryOut({ type: 'clear' });
+    this.#carryOut({ type: 'fit' });
   }
 }

@@ -43,10 +43,6 @@ export interface ViewSizePx {
   readonly ratio: number;
 }
 
-/** While vertices arrive, the picture follows this often: first soon, then not so often that drawing delays the reading. */
-const GROWTH_FRAME_MS: Ms = 150;
-const GROWTH_FRAME_MAX_MS: Ms = 1000;
-const GROWTH_SLOWER = 1.5;
 /** Found ranges are told at most this often. */
 const RANGES_MS: Ms = 250;
 
@@ -82,10 +78,8 @@ export class ToolpathView {
   #highlight: VertexIndex | null = null;
   #nozzleMm: Vec3 | null = null;
   #follows = false;
-  /** The camera stands where it was put to see all: then it goes on doing so. */
+  /** Nobody has moved the camera since it was put to see all: then it goes on doing so. */
   #isFitted = false;
-  #grown: Ms = 0;
-  #growthMs: Ms = GROWTH_FRAME_MS;
   #rangesTimer: ReturnType<typeof setTimeout> | null = null;
 
   constructor(
@@ -123,24 +117,26 @@ export class ToolpathView {
     this.#empty();
     this.#model.content = new Content(header);
     this.#model.printed = ALL_PRINTED;
-    // The first vertices are shown at once; until then there is nothing to see.
-    this.#grown = -Infinity;
-    this.#growthMs = GROWTH_FRAME_MS;
+    this.#loop.begins();
   }
 
   /** The next vertices of the file, four words each; the array is copied. */
   append(vertices: Uint32Array): void {
-    this.#model.content?.append(vertices);
+    const { content } = this.#model;
+    if (!content) return;
+    content.append(vertices);
     this.#tellRanges();
-    this.#hasGrown();
+    this.#loop.grew();
   }
 
   /** Planner channels of the next vertices that have none yet, four words each; the array is copied. */
   appendChannels(words: Uint32Array): void {
-    this.#model.content?.appendChannels(words);
+    const { content, mode } = this.#model;
+    if (!content) return;
+    content.appendChannels(words);
     this.#drawing.uploadChannels();
     this.#tellRanges();
-    if (isPlanned(this.#model.mode)) this.#hasGrown();
+    if (isPlanned(mode)) this.#loop.grew();
   }
 
   /** The file has no more vertices. */
@@ -148,7 +144,8 @@ export class ToolpathView {
     const { content } = this.#model;
     content?.end();
     this.#tellRanges();
-    this.#loop.moved();
+    this.#seeAll();
+    this.#loop.ended();
     if (content) this.#tell({ type: 'built', vertices: content.store.count });
   }
 
@@ -166,7 +163,7 @@ export class ToolpathView {
     this.#drawing.layerTimes.set(layers);
     this.#tellRanges();
     // Times alone change no picture but that of times.
-    if (!same || this.#model.mode === 'layerTime') this.#loop.moved();
+    if (!same || this.#model.mode === 'layerTime') this.#loop.changed();
   }
 
   show(shown: Partial<Shown>): void {
@@ -292,11 +289,10 @@ export class ToolpathView {
 
   /** The whole part in view, or the bed when there is none; `direction` also turns the camera. */
   fit(direction?: Pick<CameraState, 'azimuth' | 'elevation'>): void {
-    const { camera, content, bedBox } = this.#model;
-    const box = content?.store.box() ?? bedBox ?? EMPTY_BOX;
-    const fitted = fit({ ...camera, ...direction }, box, this.#drawing.stage.size);
+    const { camera, content } = this.#model;
+    const fitted = this.#cameraOnAll(direction);
     // The empty bed is not drawn again when a file is about to come.
-    if (content || !isSameCamera(fitted, camera)) this.#move(fitted);
+    if (content || !isSameCamera(fitted, camera)) this.#put(fitted);
     this.#isFitted = true;
   }
 
@@ -306,15 +302,13 @@ export class ToolpathView {
   }
 
   setProjection(projection: Projection): void {
-    const isFitted = this.#isFitted;
-    this.#move({ ...this.#model.camera, projection });
-    this.#isFitted = isFitted;
+    this.#put({ ...this.#model.camera, projection });
   }
 
   resize({ width, height, ratio }: ViewSizePx): void {
     this.#drawing.smooth.reset();
     this.#drawing.stage.resize(width, height, ratio);
-    if (this.#isFitted) this.fit();
+    this.#seeAll();
     this.#loop.moved();
   }
 
@@ -343,10 +337,28 @@ export class ToolpathView {
     this.#tell({ type: 'contextRestored' });
   };
 
+  /** The user moves it. */
   #move(camera: CameraState): void {
     this.#isFitted = false;
+    this.#put(camera);
+  }
+
+  #put(camera: CameraState): void {
     this.#model.camera = camera;
     this.#loop.moved();
+  }
+
+  #cameraOnAll(direction?: Pick<CameraState, 'azimuth' | 'elevation'>): CameraState {
+    const { camera, content, bedBox } = this.#model;
+    const box = content?.store.box() ?? bedBox ?? EMPTY_BOX;
+    return fit({ ...camera, ...direction }, box, this.#drawing.stage.size);
+  }
+
+  /** All that there is by now, unless the user has moved the camera. It is not drawn by this. */
+  #seeAll(): void {
+    if (!this.#isFitted) return;
+    this.#model.camera = this.#cameraOnAll();
+    this.#followNozzle();
   }
 
   /** Without a file there is nothing to be drawn anew: the first picture of the next one need not wait for that. */
@@ -359,16 +371,7 @@ export class ToolpathView {
     const { camera } = this.#model;
     if (!this.#follows || !at) return;
     const [x, y, z] = camera.targetMm;
-    if (x !== at[0] || y !== at[1] || z !== at[2]) this.#move({ ...camera, targetMm: at });
-  }
-
-  #hasGrown(): void {
-    if (!this.#model.content) return;
-    const now = performance.now();
-    if (now - this.#grown < this.#growthMs) return;
-    this.#grown = now;
-    this.#growthMs = Math.min(this.#growthMs * GROWTH_SLOWER, GROWTH_FRAME_MAX_MS);
-    this.#loop.grew();
+    if (x !== at[0] || y !== at[1] || z !== at[2]) this.#put({ ...camera, targetMm: at });
   }
 
   /** Soon, and not oftener than it helps. */
@@ -380,7 +383,7 @@ export class ToolpathView {
       this.#tell({ type: 'ranges', ranges: content.ranges, isWhole: content.isWhole });
       // What has come since the last picture may be in colour.
       if (!isPlanned(mode)) return;
-      if (content.isWhole) this.#loop.moved();
+      if (content.isWhole) this.#loop.ended();
       else this.#loop.grew();
     }, RANGES_MS);
   }

@@ -218,6 +218,77 @@ describe('pictures of large files', () => {
   });
 });
 
+describe('a file that comes', () => {
+  /** Bytes come every 10 ms for so long. */
+  const grow = ({ clock, loop }: ReturnType<typeof setUp>, ms: number): void => {
+    const until = clock.time + ms;
+    while (clock.time < until) {
+      loop.grew();
+      clock.run(clock.time + 10);
+    }
+  };
+
+  test('its first picture is drawn at once, and where pictures take long they leave the processor to the reading', () => {
+    const slow = setUp(1_000_000, 0.02);
+    slow.loop.begins();
+    grow(slow, 5_000);
+    const { reports } = slow;
+    expect(reports[0]?.kind).toBe('quick');
+    expect(reports.every(({ kind }) => kind === 'quick')).toBe(true);
+    expect(reports.reduce((sum, { totalMs }) => sum + totalMs, 0)).toBeLessThan(5_000 / 6);
+
+    const fast = setUp(1_000_000, 0.000_1);
+    // Everything fits into a frame, once that is known.
+    fast.loop.begins();
+    grow(fast, 5_000);
+    expect(fast.reports.length).toBeGreaterThanOrEqual(6);
+    expect(reports.length).toBeLessThan(fast.reports.length);
+  });
+
+  test('the next file shows itself at once again', () => {
+    const made = setUp(1_000_000, 0.02);
+    made.loop.begins();
+    grow(made, 3_000);
+    const before = made.reports.length;
+    made.loop.begins();
+    made.loop.grew();
+    made.clock.run(made.clock.time + 500);
+    expect(made.reports.length).toBe(before + 1);
+  });
+
+  test('who moves the view meanwhile gets no full picture before it is whole', () => {
+    const made = setUp(1_000_000, 0.001);
+    made.loop.begins();
+    grow(made, 500);
+    made.loop.moved();
+    grow(made, 1_000);
+    expect(made.reports.every(({ kind }) => kind === 'quick')).toBe(true);
+    made.loop.ended();
+    made.clock.run(made.clock.time + 20_000);
+    expect(made.reports.at(-1)).toMatchObject({ kind: 'full', more: false });
+    expect(made.clock.idle).toBe(true);
+  });
+
+  test('what changes at its end is one picture where that takes long, and who waits for rest waits for it', () => {
+    const { clock, loop, reports } = setUp(1_000_000, 0.02);
+    loop.moved();
+    clock.run(30_000);
+    expect(reports.at(-1)?.kind).toBe('full');
+    const before = reports.length;
+    const told: string[] = [];
+    loop.changed();
+    loop.onRest(() => told.push(`behind ${reports.at(-1)?.kind}`));
+    loop.ended();
+    clock.run(clock.time + 50);
+    loop.changed();
+    expect(reports.length).toBe(before);
+    clock.run(clock.time + 30_000);
+    expect(reports.slice(before).filter(({ kind }) => kind === 'quick')).toHaveLength(1);
+    expect(told).toEqual(['behind full']);
+    expect(clock.idle).toBe(true);
+  });
+});
+
 describe('several samples a pixel', () => {
   test('are given up where they take long, and come back where that was not their fault', () => {
     const choice = new SmoothChoice();

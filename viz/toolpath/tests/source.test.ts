@@ -35,7 +35,7 @@ test('a new job that is faster than the word that the old one is over is not los
   say(3, begin);
   say(3, append);
   source.discard(3);
-  expect(done).toEqual(['begin', 'append']);
+  expect(done).toEqual(['clear', 'fit', 'begin', 'append']);
 });
 
 test('what comes of a job before its beginning is dropped', () => {
@@ -43,5 +43,5 @@ test('what comes of a job before its beginning is dropped', () => {
   say(2, append);
   say(2, begin);
   say(2, append);
-  expect(done).toEqual(['begin', 'append']);
+  expect(done).toEqual(['clear', 'fit', 'begin', 'append']);
 });

@@ -1,14 +1,17 @@
 // The preview: the 3D view with what belongs to it, the file's text, and the place where files are dropped.
 import type { JSX } from 'preact';
+import { meshShown } from '../state/mesh';
 import { file, outline, reading } from '../state/preview';
 import { settings } from '../state/settings';
 import { Icon } from './icons';
+import { Later } from './later';
 import { formatNumber } from './numbers';
 import { openSample, pickFile } from './open_file';
 import { Button } from './parts';
 import { Canvas, drawnShare, isFlat, viewFailure } from './view/canvas';
 import { GcodeText } from './view/gcode_text';
 import { Legend } from './view/legend';
+import { MeshAlone } from './view/mesh';
 import { LayerBar, MoveBar } from './view/range_bars';
 import { HoverNote, SegmentCard } from './view/segment_card';
 import { ViewTools } from './view/tools';
@@ -59,9 +62,10 @@ function Drawing(): JSX.Element | null {
   return <p class="view-short">Full picture: {Math.floor(100 * share)} %</p>;
 }
 
+/** Over the plate, or, where the bed's mesh is to be seen, below it. */
 function Empty(): JSX.Element {
   return (
-    <div class="empty">
+    <div class={`empty ${meshShown.value && !isFlat.value ? 'below' : ''}`}>
       <span class="empty-icon">
         <Icon name="file" />
       </span>
@@ -93,21 +97,32 @@ export function Viewer(): JSX.Element {
             {hasView && <Drawing />}
             {hasView && <ViewTools isFlat={isFlat.value} />}
           </div>
+          {!file.value && hasView && !isFlat.value && <MeshAlone />}
           {outline.value && hasView && (
             <>
-              <Legend isFlat={isFlat.value} />
+              <Later pictures={1}>
+                <Legend isFlat={isFlat.value} />
+              </Later>
               <SegmentCard />
               <HoverNote />
             </>
           )}
         </div>
-        {outline.value && hasView && <LayerBar />}
+        {outline.value && hasView && (
+          <Later pictures={2}>
+            <LayerBar />
+          </Later>
+        )}
         {hasText && <GcodeText />}
       </div>
       {progress !== null && (
         <progress class="reading" aria-label="Reading the file" max={1} value={progress} />
       )}
-      {outline.value && hasView && <MoveBar />}
+      {outline.value && hasView && (
+        <Later pictures={2}>
+          <MoveBar />
+        </Later>
+      )}
     </section>
   );
 }

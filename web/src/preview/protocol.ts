@@ -141,6 +141,8 @@ export type ToPreview =
       readonly name: string;
       readonly config: string | null;
     }
+  /** The outline is shown: the planner may have the processor. */
+  | { readonly kind: 'plan'; readonly job: number }
   /** Nothing is to be read any more, or shown of what was. */
   | { readonly kind: 'close'; readonly job: number }
   /** Where the geometry goes: requests of the 3D view, each with its job, past the page's main thread. */
@@ -166,10 +168,16 @@ export type ToPreview =
 export type FromPreview =
   | { readonly kind: 'loaded' }
   | { readonly kind: 'failed'; readonly job: number | null; readonly trouble: Trouble }
-  /** Pairs of a line and the vertex where its segment ends, some dozens of vertices apart, in order. */
-  | { readonly kind: 'marks'; readonly job: number; readonly marks: Uint32Array<ArrayBuffer> }
-  /** One byte a vertex, in order: how many lines further than the one before it it comes from; 255 where a mark says. */
-  | { readonly kind: 'line-steps'; readonly job: number; readonly steps: Uint8Array<ArrayBuffer> }
+  /**
+   * Where lines lie on the path, in order. `marks`: pairs of a line and the vertex where its segment ends, some dozens of vertices
+   * apart. `steps`: one byte a vertex, how many lines further than the one before it it comes from; 255 where a mark says.
+   */
+  | {
+      readonly kind: 'places';
+      readonly job: number;
+      readonly marks: readonly Uint32Array<ArrayBuffer>[];
+      readonly steps: readonly Uint8Array<ArrayBuffer>[];
+    }
   | { readonly kind: 'thumbnails'; readonly job: number; readonly thumbnails: readonly Thumbnail[] }
   /** The file is packed and too large to be kept unpacked: any look at its text reads it from its beginning. */
   | { readonly kind: 'slow-text'; readonly job: number }

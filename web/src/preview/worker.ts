@@ -11,8 +11,11 @@ import type { FromPreview, Summary, ToPreview } from './protocol';
 import { SlicedFile } from './sliced_file';
 import { Unpacked } from './unpacked';
 
-/** Progress is told this often at most, in ms. */
-const PROGRESS_MS = 50;
+/**
+ * Progress is told this often at most, in ms, and where lines lie on the path: each time, the page puts a picture of itself
+ * together, and where the processor does that, it is taken from the reading.
+ */
+const PROGRESS_MS = 400;
 
 const scope = self as unknown as { postMessage(message: FromPreview, transfer?: Transferable[]): void };
 const tell = (message: FromPreview, transfer: Transferable[] = []): void =>
@@ -60,14 +63,35 @@ interface Opened {
 }
 let opened: Opened | undefined;
 
+/** Where the lines of the open file lie on the path, as far as the page has not been told. */
+let places: { readonly job: number; readonly marks: Numbers32[]; readonly steps: Numbers8[] } | undefined;
+type Numbers32 = Uint32Array<ArrayBuffer>;
+type Numbers8 = Uint8Array<ArrayBuffer>;
+
+function tellPlaces(): void {
+  if (!places) return;
+  const { job, marks, steps } = places;
+  places = undefined;
+  tell(
+    { kind: 'places', job, marks, steps },
+    [...marks, ...steps].map(({ buffer }) => buffer),
+  );
+}
+
+function takePlaces(preview: FilePreview, job: number): void {
+  const marks = preview.takeMarks();
+  const steps = preview.takeLineSteps();
+  if (marks.length === 0 && steps.length === 0) return;
+  if (places?.job !== job) places = { job, marks: [], steps: [] };
+  places.marks.push(marks);
+  places.steps.push(steps);
+}
+
 /** Hands out what came of the bytes that were fed. */
 function pass(preview: FilePreview, job: number): void {
   for (;;) {
     const vertices = preview.takeVertices();
-    const marks = preview.takeMarks();
-    if (marks.length > 0) tell({ kind: 'marks', job, marks }, [marks.buffer]);
-    const steps = preview.takeLineSteps();
-    if (steps.length > 0) tell({ kind: 'line-steps', job, steps }, [steps.buffer]);
+    takePlaces(preview, job);
     const thumbnails = preview.takeThumbnails();
     if (thumbnails.length > 0) tell({ kind: 'thumbnails', job, thumbnails });
     if (vertices.length === 0) return;
@@ -107,6 +131,7 @@ function progress(job: number): (share: number, lines: number) => void {
   return (share, lines) => {
     if (performance.now() - told <= PROGRESS_MS) return;
     told = performance.now();
+    tellPlaces();
     tell({ kind: 'progress', job, share, lines });
   };
 }
@@ -128,10 +153,10 @@ async function readGeometry(chunks: Chunks, preview: FilePreview, open: Opened):
   }
   preview.finish();
   pass(preview, job);
+  tellPlaces();
   const outline = preview.summary();
   draw(job, { type: 'setLayers', layers: layersOf(outline) });
   draw(job, { type: 'end' });
-  draw(job, { type: 'fit' });
   tell({ kind: 'outline', job, outline });
   return outline;
 }
@@ -186,6 +211,9 @@ async function refusalOf(
   return reader.refuse(first ?? new Uint8Array(), name.replace(/\.gz$/i, ''));
 }
 
+/** Until the page has shown the outline, it has the processor to itself: it is not held up by what nobody waits for yet. */
+let waiting: { readonly job: number; readonly go: () => void } | undefined;
+
 async function read(
   reader: Reader,
   { job, file, name, config: machine }: ToPreview & { kind: 'open' },
@@ -201,8 +229,11 @@ async function read(
   const outline = await through(open, preview, readGeometry);
   if (!outline || current !== job) return;
   if (unpacked?.isGivenUp) tell({ kind: 'slow-text', job });
-  if (config === null) tell({ kind: 'summary', job, summary: outline });
-  else await through(open, reader.preview(config), readPlan);
+  if (config === null) return tell({ kind: 'summary', job, summary: outline });
+  await new Promise<void>((go) => {
+    waiting = { job, go };
+  });
+  if (current === job) await through(open, reader.preview(config), readPlan);
 }
 
 async function open(message: ToPreview & { kind: 'open' }): Promise<void> {
@@ -259,6 +290,8 @@ async function tellText({ id, job, first, last }: ToPreview & { kind: 'text' }):
 function close(job: number): void {
   current = job;
   opened = undefined;
+  waiting?.go();
+  waiting = undefined;
 }
 
 self.onmessage = ({ data }: MessageEvent<ToPreview>): void => {
@@ -267,6 +300,9 @@ self.onmessage = ({ data }: MessageEvent<ToPreview>): void => {
       return void open(data);
     case 'close':
       return close(data.job);
+    case 'plan':
+      if (waiting?.job === data.job) waiting.go();
+      return;
     case 'draw':
       drawing = data.port;
       return;

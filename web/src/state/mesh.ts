@@ -4,6 +4,7 @@ import { computed, signal } from '@preact/signals';
 import type { BedMesh } from '@stepcast/toolpath';
 import type { MachineMesh, MachineSummary } from '../preview/protocol';
 import { isReady, snapshot } from './machine';
+import { settings } from './settings';
 
 /** What the profile in use describes; null until it is read, and where it describes no machine. */
 export const machineSummary = signal<MachineSummary | null>(null);
@@ -29,7 +30,10 @@ export function meshOf(
   );
 }
 
+/** The one to look at, whether or not it is shown. */
 export const meshInView = computed(() => meshOf(meshes.value, meshInForce.value, wantedMesh.value));
+/** The one that is shown. */
+export const meshShown = computed(() => (settings.value.showMesh ? meshInView.value : null));
 
 /** As the 3D view takes it. */
 export const surfaceOf = ({ origin, step, rows }: MachineMesh): BedMesh => ({

@@ -4,6 +4,7 @@ import { batch, effect, signal } from '@preact/signals';
 import type { Trouble } from '../machine/protocol';
 import { previewDied } from '../machine/troubles';
 import type { ConfigReport, FromPreview, Summary, Thumbnail, ToPreview } from '../preview/protocol';
+import { afterPictures } from '../tasks';
 import { note } from './log';
 import { LineMarks } from './marks';
 import { activeProfile } from './profiles';
@@ -39,6 +40,9 @@ export const linesRead = signal(0);
 /** The pictures of the print that are in it; a handful at most. */
 export const thumbnails = signal<readonly Thumbnail[]>([]);
 export const confirmed = signal<ReadonlySet<number>>(new Set());
+
+/** What belongs to an outline is on the page after so many pictures. */
+const OUTLINE_PICTURES = 3;
 
 /** A worker that stops this often without having read anything in between is not started again. */
 const DEATHS_MAX = 3;
@@ -245,11 +249,9 @@ function take(message: FromPreview): void {
   // What is still on its way from a file that was put away.
   if (message.job !== null && message.job !== job) return;
   switch (message.kind) {
-    case 'marks':
-      marks.append(message.marks);
-      break;
-    case 'line-steps':
-      marks.appendSteps(message.steps);
+    case 'places':
+      for (const more of message.marks) marks.append(more);
+      for (const more of message.steps) marks.appendSteps(more);
       break;
     case 'slow-text':
       isTextSlow.value = true;
@@ -258,12 +260,17 @@ function take(message: FromPreview): void {
       thumbnails.value = [...thumbnails.value, ...message.thumbnails];
       break;
     case 'progress':
-      reading.value = Math.min(1, message.share);
-      linesRead.value = message.lines;
+      batch(() => {
+        reading.value = Math.min(1, message.share);
+        linesRead.value = message.lines;
+      });
       break;
     case 'outline':
-      linesRead.value = message.outline.lines;
-      outline.value = message.outline;
+      batch(() => {
+        linesRead.value = message.outline.lines;
+        outline.value = message.outline;
+      });
+      afterPictures(OUTLINE_PICTURES, () => send({ kind: 'plan', job: message.job }));
       break;
     case 'summary':
       deaths = 0;

@@ -7,7 +7,7 @@ import type { MachineMesh } from '../../preview/protocol';
 import { followText } from '../../state/file_text';
 import { followCursor, lookUp, type Segment } from '../../state/inspect';
 import { isPrinting, isReady, snapshot } from '../../state/machine';
-import { machineSummary, meshInView, surfaceOf } from '../../state/mesh';
+import { machineSummary, meshShown, surfaceOf } from '../../state/mesh';
 import { stop, toggle } from '../../state/playback';
 import { file, outline, setSink } from '../../state/preview';
 import { isShown, printedVertex } from '../../state/print';
@@ -112,7 +112,7 @@ function followNozzle(host: ToolpathHost): () => void {
 function followMesh(host: ToolpathHost): () => void {
   let told: MachineMesh | null = null;
   return effect(() => {
-    const mesh = settings.value.showMesh ? meshInView.value : null;
+    const mesh = meshShown.value;
     if (mesh !== told) host.setMesh(mesh && surfaceOf(mesh));
     told = mesh;
   });
@@ -227,6 +227,8 @@ function take(event: ViewEvent): void {
     viewFailure.value = event.reason;
     isFlat.value = event.isFlat;
   }
+  // All is drawn anew once there is a context again.
+  if (event.type === 'contextLost') void awaitPicture();
   if (event.type === 'frame') drawnShare.value = event.report.kind === 'part' ? event.report.share : null;
   if (event.type === 'ranges') ranges.value = { found: event.ranges, isWhole: event.isWhole };
 }

@@ -81,3 +81,12 @@ export function MeshPart(): JSX.Element | null {
     </section>
   );
 }
+
+/** Over the empty plate: the same without a file's legend around it. */
+export function MeshAlone(): JSX.Element | null {
+  return meshes.value.length === 0 ? null : (
+    <div class="legend mesh-alone">
+      <MeshPart />
+    </div>
+  );
+}
