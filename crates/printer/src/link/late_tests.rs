@@ -102,6 +102,41 @@ fn after_a_time_out_late_answers_do_not_multiply_what_is_on_the_line() {
 }
 
 #[test]
+fn after_two_time_outs_enough_is_sent_to_end_what_the_board_takes_for_a_block_and_late_answers_still_do_no_harm()
+ {
+    let mut played = Played::new();
+    played.queue_blocks(4);
+    played.poll();
+    let (first, second) = (played.wait(), played.wait());
+    assert_eq!(second.len(), first.len() + BLOCK_BYTES_MAX);
+    let mut deframer = Deframer::new();
+    let (mut blocks, mut garbage) = (0, 0);
+    deframer.push(&[BLOCK_BYTES_MAX as u8, 0x10], |_| unreachable!("a block seems to begin"));
+    deframer.push(&second, |frame| match frame {
+        Frame::Block { .. } => blocks += 1,
+        Frame::Garbage => garbage += 1,
+    });
+    assert_eq!((blocks, garbage), (1, 1), "the block is found behind it");
+    let mut sent = Vec::new();
+    for _ in 0..4 {
+        played.answer_next(0.001);
+        played.queue_blocks(1);
+        sent.extend(played.poll());
+    }
+    // The answers to both repetitions and to what the board took for noise.
+    for _ in 0..3 {
+        played.answer(0.001);
+        sent.extend(played.poll());
+    }
+    for _ in 0..4 {
+        played.answer_next(0.003);
+        sent.extend(played.poll());
+    }
+    assert_eq!(played.link.stats().retransmissions, 2);
+    assert!(played.link.is_idle());
+}
+
+#[test]
 fn after_a_time_out_a_refusal_has_all_that_was_lost_sent_again() {
     let mut played = Played::new();
     played.queue_blocks(5);

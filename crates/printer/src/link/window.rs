@@ -34,6 +34,9 @@ const TRANSMISSIONS_REMEMBERED: usize = 64;
 /// The board sends four bits of a sequence number that the host counts in full.
 const SEQUENCES: u64 = SEQUENCE_MASK as u64 + 1;
 
+/// What is sent as noise has no number; those of blocks are greater.
+const NOISE: u64 = 0;
+
 /// The motion in a block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MotionClocks {
@@ -307,8 +310,13 @@ impl Window {
         let before = out.len();
         let blocks = if refused { self.sent.len() } else { 1 };
         let is_silent = timed_out && self.asked > self.latest(self.expected).place;
-        // A board that takes noise for the beginning of a block is silent until so many bytes have come.
-        out.resize(before + if is_silent { BLOCK_BYTES_MAX } else { 1 }, SYNC);
+        if is_silent {
+            // A board that takes noise for the beginning of a block is silent until so many bytes have come; these are none
+            // that a block ends with.
+            out.resize(before + BLOCK_BYTES_MAX, 0);
+            self.log(NOISE, now_s);
+        }
+        out.push(SYNC);
         for at in 0..blocks {
             let sent = &mut self.sent[at];
             out.extend_from_slice(sent.block.as_bytes());
@@ -325,18 +333,22 @@ impl Window {
     }
 
     fn transmitted(&mut self, sequence: u64, only: bool, at_s: f64) {
-        let place = self.transmissions;
+        let place = self.log(sequence, at_s);
         self.latest[(sequence % SEQUENCES) as usize] = Transmission { at_s, only, place };
-        self.log[place as usize % TRANSMISSIONS_REMEMBERED] = Logged { sequence, at_s };
-        self.transmissions += 1;
     }
 
     /// A refusal of what was sent before still is one: everything behind it is lost as well.
     fn asked(&mut self, sequence: u64, at_s: f64) {
         self.latest[(sequence % SEQUENCES) as usize].only = false;
-        (self.asked, self.asked_s) = (self.transmissions, at_s);
-        self.log[self.asked as usize % TRANSMISSIONS_REMEMBERED] = Logged { sequence, at_s };
+        (self.asked, self.asked_s) = (self.log(sequence, at_s), at_s);
+    }
+
+    /// Something was sent that gets an answer. Gives its place.
+    fn log(&mut self, sequence: u64, at_s: f64) -> u64 {
+        let place = self.transmissions;
+        self.log[place as usize % TRANSMISSIONS_REMEMBERED] = Logged { sequence, at_s };
         self.transmissions += 1;
+        place
     }
 
     fn latest(&self, sequence: u64) -> Transmission {
