@@ -4,8 +4,10 @@
 //! come from the plan and the nominal frequency alone.
 //!
 //! Units: host time in seconds, the board's clock in ticks. Source: the manner of Klipper's clock synchronisation as
-//! publicly documented (exponential weights, outliers, half the smallest round trip), with the nominal frequency as
-//! a prior for the slope, so that a few early samples close together cannot tilt the line.
+//! publicly documented (exponential weights, outliers), with the nominal frequency as a prior for the slope, so that a
+//! few early samples close together cannot tilt the line. When the board read its clock is known to half the round trip,
+//! either way; so samples count by its inverse square, and those that a slow line delayed hardly do (RFC 5905 takes the
+//! sample with the shortest).
 
 use units::{Clock32, Hertz, Seconds, Ticks};
 
@@ -44,8 +46,10 @@ const SETTLED_SAMPLES_ALWAYS: u32 = 60;
 /// The weight of the nominal frequency against the samples: the square of a sample's error (1 ms) over that of the
 /// frequency's (0.1 %), in square seconds.
 const PRIOR_S2: f64 = 1.0;
-/// The smallest round trip is forgotten at this rate, in seconds per second.
-const ROUND_TRIP_RISE: f64 = 1e-5;
+/// Samples with a longer round trip than this count for less, in seconds.
+const ROUND_TRIP_GOOD_S: f64 = 0.003;
+/// The shortest round trip is forgotten at this rate, half of it in seconds per second.
+const DOUBT_RISE: f64 = 5e-6;
 
 /// No board runs for centuries: clocks beyond this are nonsense, and sums of clocks below it cannot overflow.
 const CLOCK_MAX: u64 = 1 << 60;
@@ -66,7 +70,9 @@ struct Line {
     base_s: f64,
     base: Ticks,
     samples: u32,
-    /// Means and moments, exponentially weighted. Units: seconds and ticks.
+    /// The samples' weights together; one of a good sample that has just come is 1.
+    weight: f64,
+    /// Means and moments, weighted, and exponentially by age. Units: seconds and ticks.
     time_mean: f64,
     clock_mean: f64,
     time_variance: f64,
@@ -81,11 +87,12 @@ struct Line {
 }
 
 impl Line {
-    fn new(at_s: f64, clock: Ticks, nominal: f64) -> Self {
+    fn new(reading: Reading, clock: Ticks, nominal: f64) -> Self {
         Self {
-            base_s: at_s,
+            base_s: reading.at_s,
             base: clock,
             samples: 1,
+            weight: reading.weight,
             time_mean: 0.0,
             clock_mean: 0.0,
             time_variance: 0.0,
@@ -94,7 +101,7 @@ impl Line {
             error_variance: 0.0,
             near_in_a_row: 0,
             outliers_in_a_row: 0,
-            last_s: at_s,
+            last_s: reading.sent_s,
         }
     }
 
@@ -112,19 +119,52 @@ impl Line {
         self.base_s + self.time_mean + (relative as f64 - self.clock_mean) / self.slope
     }
 
-    fn add(&mut self, at_s: f64, clock: Ticks, nominal: f64) {
-        let time = at_s - self.base_s;
+    fn add(&mut self, reading: Reading, clock: Ticks, nominal: f64) {
+        let time = reading.at_s - self.base_s;
         let relative = (clock.0 as i128 - self.base.0 as i128) as f64;
         self.samples = self.samples.saturating_add(1);
-        let weight = DECAY.max(1.0 / f64::from(self.samples));
+        self.weight += reading.weight - DECAY * self.weight;
+        let part = reading.weight / self.weight;
         let (time_off, clock_off) = (time - self.time_mean, relative - self.clock_mean);
-        self.time_mean += weight * time_off;
-        self.clock_mean += weight * clock_off;
-        self.time_variance = (1.0 - weight) * (self.time_variance + weight * time_off * time_off);
-        self.covariance = (1.0 - weight) * (self.covariance + weight * time_off * clock_off);
-        let prior = PRIOR_S2 * weight;
+        self.time_mean += part * time_off;
+        self.clock_mean += part * clock_off;
+        self.time_variance = (1.0 - part) * (self.time_variance + part * time_off * time_off);
+        self.covariance = (1.0 - part) * (self.covariance + part * time_off * clock_off);
+        let prior = PRIOR_S2 / self.weight;
         self.slope = (self.covariance + nominal * prior) / (self.time_variance + prior);
-        self.last_s = at_s;
+        self.last_s = reading.sent_s;
+    }
+}
+
+/// When the board read its clock.
+#[derive(Clone, Copy, Debug)]
+struct Reading {
+    sent_s: f64,
+    /// In the middle of the round trip.
+    at_s: f64,
+    /// How far from that it may have been.
+    doubt_s: f64,
+    /// 1 where that is little.
+    weight: f64,
+}
+
+impl Reading {
+    /// From when the question was sent and its answer came; nothing where that cannot have been.
+    fn new(sent: Option<Seconds>, received: Seconds) -> Option<Self> {
+        let sent = sent?;
+        let round_trip_s = received.0 - sent.0;
+        let excess = (round_trip_s / ROUND_TRIP_GOOD_S).max(1.0);
+        (0.0..=SILENT_S).contains(&round_trip_s).then(|| Self {
+            sent_s: sent.0,
+            at_s: sent.0 + 0.5 * round_trip_s,
+            doubt_s: 0.5 * round_trip_s,
+            weight: 1.0 / (excess * excess),
+        })
+    }
+
+    /// Some time before.
+    const fn before(received: Seconds) -> Self {
+        Self { sent_s: received.0, at_s: received.0, doubt_s: SILENT_S, weight: 1e-6 }
     }
 }
 
@@ -133,7 +173,8 @@ impl Line {
 pub struct ClockSync {
     nominal: f64,
     line: Option<Line>,
-    round_trip_min: Option<f64>,
+    /// Half the shortest round trip.
+    doubt_s_min: Option<f64>,
     asked_s: Option<f64>,
     answered_s: Option<f64>,
     /// Questions since the last answer, and when the first of them was asked.
@@ -148,7 +189,7 @@ impl ClockSync {
         Self {
             nominal: f64::from(nominal.0.max(1)),
             line: None,
-            round_trip_min: None,
+            doubt_s_min: None,
             asked_s: None,
             answered_s: None,
             unanswered: 0,
@@ -190,14 +231,15 @@ impl ClockSync {
         if clock.0 > CLOCK_MAX {
             return;
         }
+        let reading = Reading::new(sent, received).unwrap_or(Reading::before(received));
         match &self.line {
             // A first sample of unknown age still gives the high half; later ones put the rest right.
-            None => self.line = Some(Line::new(sent.unwrap_or(received).0, clock, self.nominal)),
+            None => self.line = Some(Line::new(reading, clock, self.nominal)),
             Some(line) => {
                 let predicted = line.clock_at(received.0);
                 if (predicted.0.abs_diff(clock.0) as f64) > self.nominal {
                     // The board restarted, or the host slept: start again.
-                    self.line = Some(Line::new(sent.unwrap_or(received).0, clock, self.nominal));
+                    self.line = Some(Line::new(reading, clock, self.nominal));
                     self.answers = 1;
                 } else {
                     self.sample(clock, sent, received);
@@ -221,31 +263,30 @@ impl ClockSync {
     }
 
     fn sample(&mut self, clock: Ticks, sent: Option<Seconds>, received: Seconds) {
-        let (Some(sent), Some(line)) = (sent, &mut self.line) else { return };
-        let round_trip = received.0 - sent.0;
-        // A question that was never sent after its answer came, nor before the last sample: a mistake somewhere.
-        if !(0.0..=SILENT_S).contains(&round_trip) || sent.0 < line.last_s {
+        let (Some(reading), Some(line)) = (Reading::new(sent, received), &mut self.line) else { return };
+        // A question that was sent before the last sample: a mistake somewhere.
+        if reading.sent_s < line.last_s {
             return;
         }
-        let aged = self.round_trip_min.map(|min| min + ROUND_TRIP_RISE * (sent.0 - line.last_s));
-        let shortest = aged.map_or(round_trip, |min| min.min(round_trip));
-        self.round_trip_min = Some(shortest);
-        let at_s = sent.0 + shortest / 2.0;
-        let error_s = at_s - line.time_of(clock);
+        let aged = self.doubt_s_min.map(|min| min + DOUBT_RISE * (reading.sent_s - line.last_s));
+        let least_s = aged.map_or(reading.doubt_s, |min| min.min(reading.doubt_s));
+        self.doubt_s_min = Some(least_s);
+        let error_s = (reading.at_s - line.time_of(clock)).abs();
+        // What the line's delay does not explain.
+        let strange_s = (error_s - (reading.doubt_s - least_s)).max(0.0);
         let limit_s = (OUTLIER_SIGMAS * line.error_variance.sqrt()).max(OUTLIER_S_MIN);
         if line.samples > QUICK_SAMPLES
-            && error_s.abs() > limit_s
+            && strange_s > limit_s
             && line.outliers_in_a_row < OUTLIERS_IN_A_ROW_MAX
         {
             line.outliers_in_a_row += 1;
             return;
         }
         line.outliers_in_a_row = 0;
-        let near = error_s.abs() <= SETTLED_ERROR_S + shortest / 2.0;
+        let near = error_s <= SETTLED_ERROR_S + least_s;
         line.near_in_a_row = if near { line.near_in_a_row.saturating_add(1) } else { 0 };
-        line.error_variance +=
-            (error_s * error_s - line.error_variance) * DECAY.max(1.0 / f64::from(line.samples));
-        line.add(at_s, clock, self.nominal);
+        line.add(reading, clock, self.nominal);
+        line.error_variance += (strange_s * strange_s - line.error_variance) * reading.weight / line.weight;
     }
 
     /// Whether the board's clock is known at all.
@@ -289,200 +330,4 @@ impl ClockSync {
 }
 
 #[cfg(test)]
-mod tests {
-    use rand_pcg::{Pcg32, rand_core::Rng};
-
-    use super::*;
-
-    const NOMINAL: Hertz = Hertz(12_000_000);
-
-    /// A board whose crystal is off, behind a line that delays each way by 1 ms and a chance amount.
-    struct Board {
-        start: u64,
-        frequency: f64,
-        jitter_s: f64,
-        chance: Pcg32,
-    }
-
-    impl Board {
-        fn new(frequency_ratio: f64, jitter_s: f64) -> Self {
-            // The low half wraps after five seconds.
-            let start = (7 << 32) - 5 * u64::from(NOMINAL.0);
-            Self {
-                start,
-                frequency: f64::from(NOMINAL.0) * frequency_ratio,
-                jitter_s,
-                chance: Pcg32::new(1, 2),
-            }
-        }
-
-        fn clock(&self, now_s: f64) -> u64 {
-            self.start + (now_s * self.frequency) as u64
-        }
-
-        fn delay_s(&mut self) -> f64 {
-            0.001 + self.jitter_s * f64::from(self.chance.next_u32()) / f64::from(u32::MAX)
-        }
-
-        /// Asks and answers until a time.
-        fn run(
-            &mut self,
-            sync: &mut ClockSync,
-            from_s: f64,
-            until_s: f64,
-            mut check: impl FnMut(&Self, &ClockSync, f64),
-        ) {
-            let mut now_s = from_s;
-            while now_s < until_s {
-                let request = sync.poll(Seconds(now_s)).expect("it asks when it said it would");
-                let read_s = now_s + self.delay_s();
-                let received = Seconds(read_s + self.delay_s());
-                let clock = self.clock(read_s);
-                match request {
-                    ClockRequest::Uptime => {
-                        sync.uptime(
-                            (clock >> 32) as u32,
-                            Clock32(clock as u32),
-                            Some(Seconds(now_s)),
-                            received,
-                        );
-                    }
-                    ClockRequest::Clock => sync.clock(Clock32(clock as u32), Some(Seconds(now_s)), received),
-                }
-                check(self, sync, received.0);
-                now_s = sync.next_wake().0;
-            }
-        }
-
-        fn error_s(&self, sync: &ClockSync, now_s: f64) -> f64 {
-            (sync.clock_at(Seconds(now_s)).0 as f64 - self.clock(now_s) as f64) / self.frequency
-        }
-    }
-
-    #[test]
-    fn once_settled_the_clock_is_known_to_a_millisecond_even_a_second_ahead_and_across_a_wrap() {
-        for ratio in [1.0, 1.0001, 0.9999] {
-            let mut board = Board::new(ratio, 0.0005);
-            let mut sync = ClockSync::new(NOMINAL);
-            let mut settled_s = f64::INFINITY;
-            board.run(&mut sync, 0.0, 120.0, |board, sync, now_s| {
-                if sync.is_settled() {
-                    settled_s = settled_s.min(now_s);
-                    for ahead_s in [0.0, 1.0] {
-                        let error_s = board.error_s(sync, now_s + ahead_s);
-                        assert!(
-                            error_s.abs() < 0.001,
-                            "{error_s} s off at {now_s} + {ahead_s} s, ratio {ratio}"
-                        );
-                    }
-                }
-            });
-            assert!((2.0..5.0).contains(&settled_s), "settled after {settled_s} s");
-            assert!((sync.frequency_ratio() - ratio).abs() < 2e-6, "{}", sync.frequency_ratio());
-        }
-    }
-
-    #[test]
-    fn a_busy_computer_whose_answers_come_late_at_random_is_done_in_seconds_too() {
-        let mut board = Board::new(1.0001, 0.03);
-        let mut sync = ClockSync::new(NOMINAL);
-        let mut settled_s = f64::INFINITY;
-        board.run(&mut sync, 0.0, 60.0, |_, sync, now_s| {
-            if sync.is_settled() {
-                settled_s = settled_s.min(now_s);
-            }
-        });
-        assert!(settled_s < 12.0, "settled after {settled_s} s");
-        // What delays the questions delays them all, by half of it on average.
-        assert!(board.error_s(&sync, 60.0).abs() < 0.03);
-    }
-
-    #[test]
-    fn a_clock_far_off_its_nominal_frequency_is_found_before_it_counts_as_settled() {
-        let mut board = Board::new(1.05, 0.001);
-        let mut sync = ClockSync::new(NOMINAL);
-        board.run(&mut sync, 0.0, 200.0, |board, sync, now_s| {
-            let error_s = board.error_s(sync, now_s + 1.0);
-            assert!(!sync.is_settled() || error_s.abs() < 0.01, "{error_s} s off at {now_s} s");
-        });
-        assert!(sync.is_settled());
-        assert!((sync.frequency_ratio() - 1.05).abs() < 1e-4, "{}", sync.frequency_ratio());
-    }
-
-    #[test]
-    fn times_and_clocks_are_each_others_inverse() {
-        let mut board = Board::new(1.0001, 0.0);
-        let mut sync = ClockSync::new(NOMINAL);
-        board.run(&mut sync, 0.0, 30.0, |_, _, _| {});
-        for now_s in [0.0, 29.0, 31.5, 4000.0] {
-            let time = sync.time_of(sync.clock_at(Seconds(now_s)));
-            assert!((time.0 - now_s).abs() < 1e-6, "{time}");
-        }
-    }
-
-    #[test]
-    fn late_answers_do_not_bend_the_line() {
-        let mut board = Board::new(1.0, 0.0002);
-        let mut sync = ClockSync::new(NOMINAL);
-        board.run(&mut sync, 0.0, 20.0, |_, _, _| {});
-        let clock = board.clock(20.3);
-        sync.poll(Seconds(21.0));
-        sync.clock(Clock32(clock as u32), Some(Seconds(20.0)), Seconds(20.301));
-        assert!(board.error_s(&sync, 21.0).abs() < 0.0005);
-    }
-
-    #[test]
-    fn answers_of_unknown_age_show_life_but_are_no_samples() {
-        let mut sync = ClockSync::new(NOMINAL);
-        assert!(!sync.is_known());
-        sync.poll(Seconds(0.0));
-        sync.uptime(1, Clock32(0), Some(Seconds(0.0)), Seconds(0.002));
-        let before = sync.clock_at(Seconds(10.0));
-        for at in 1..10 {
-            sync.poll(Seconds(f64::from(at)));
-            sync.clock(Clock32(99), None, Seconds(f64::from(at) + 0.1));
-        }
-        assert_eq!(sync.clock_at(Seconds(10.0)), before);
-        assert!(!sync.is_silent(Seconds(14.0)));
-    }
-
-    #[test]
-    fn a_silent_board_is_noticed_after_five_seconds() {
-        let mut board = Board::new(1.0, 0.0);
-        let mut sync = ClockSync::new(NOMINAL);
-        board.run(&mut sync, 0.0, 20.0, |_, _, _| {});
-        let (mut now_s, mut questions) = (sync.next_wake().0, 0);
-        let start_s = now_s;
-        while !sync.is_silent(Seconds(now_s)) {
-            questions += usize::from(sync.poll(Seconds(now_s)).is_some());
-            now_s = sync.next_wake().0;
-        }
-        assert!((5.0..5.5).contains(&(now_s - start_s)), "{now_s}");
-        assert!((15..30).contains(&questions), "{questions}");
-        // Who has been silent so long is asked for the whole clock: the low half may have wrapped.
-        assert_eq!(sync.poll(Seconds(now_s + 1.0)), Some(ClockRequest::Uptime));
-    }
-
-    #[test]
-    fn a_board_that_restarted_is_followed() {
-        let mut board = Board::new(1.0, 0.0);
-        let mut sync = ClockSync::new(NOMINAL);
-        board.run(&mut sync, 0.0, 20.0, |_, _, _| {});
-        sync.uptime(0, Clock32(1000), Some(Seconds(20.0)), Seconds(20.002));
-        assert!(!sync.is_settled());
-        assert_eq!(sync.clock_at(Seconds(20.0)), Ticks(1000));
-    }
-
-    #[test]
-    fn nonsense_is_survived() {
-        let mut sync = ClockSync::new(Hertz(0));
-        for value in [0, 1, u32::MAX / 2, u32::MAX] {
-            for sent in [None, Some(Seconds(-1e300)), Some(Seconds(f64::NAN)), Some(Seconds(1e300))] {
-                sync.poll(Seconds(f64::from(value)));
-                sync.uptime(value, Clock32(value), sent, Seconds(1.0));
-                sync.clock(Clock32(value), sent, Seconds(2.0));
-                let _ = sync.time_of(sync.clock_at(Seconds(1e300)));
-            }
-        }
-    }
-}
+mod tests;

@@ -136,6 +136,18 @@ impl Deframer {
         }
     }
 
+    /// Bytes that may become a block, but for which others are still missing.
+    pub const fn pending(&self) -> usize {
+        self.len
+    }
+
+    /// The rest of the block that seems to have begun will not come: its length was damaged, and it has swallowed what came
+    /// behind it.
+    pub fn give_up(&mut self, mut found: impl FnMut(Frame<'_>)) {
+        self.lost |= self.len > 0;
+        while self.step(&mut found) {}
+    }
+
     /// Judges the front of the buffer; `true` when it took something off and the rest is to be judged anew.
     fn step(&mut self, found: &mut impl FnMut(Frame<'_>)) -> bool {
         if !self.lost {
@@ -211,6 +223,30 @@ mod tests {
         let mut stream = vec![SYNC, SYNC];
         stream.extend(Block::new(3, &[7]).as_bytes());
         assert_eq!(read(&stream), vec![Seen::Block(3, vec![7])]);
+    }
+
+    #[test]
+    fn blocks_swallowed_by_a_false_length_are_found_once_it_is_given_up() {
+        let mut stream = Block::new(3, &[]).as_bytes().to_vec();
+        stream[0] = 64;
+        stream.extend(Block::new(4, &[]).as_bytes());
+        let whole = stream.len();
+        stream.extend(&Block::new(5, &[9]).as_bytes()[..3]);
+        let (mut deframer, mut seen) = (Deframer::new(), Vec::new());
+        deframer.push(&stream, |_| unreachable!("the end of the false block is still to come"));
+        assert_eq!(deframer.pending(), stream.len());
+        deframer.give_up(|frame| {
+            seen.push(match frame {
+                Frame::Block { sequence, .. } => Seen::Block(sequence, Vec::new()),
+                Frame::Garbage => Seen::Garbage,
+            });
+        });
+        assert_eq!(seen, vec![Seen::Garbage, Seen::Block(4, Vec::new())]);
+        assert_eq!(
+            deframer.pending(),
+            stream.len() - whole,
+            "what has begun behind them may still become a block"
+        );
     }
 
     #[test]

@@ -70,13 +70,14 @@ impl Channel {
         const STALL_S_MAX: f64 = 0.02;
         let Conditions { latency_s, jitter_s, bytes_per_s, corrupt, drop, duplicate, stall } =
             self.conditions;
-        let mut jitter_s = jitter_s * self.part();
+        let jitter_s = jitter_s * self.part();
         for &byte in bytes {
             self.busy_until_s = self.busy_until_s.max(now_s) + 1.0 / bytes_per_s;
+            let mut arrival_s = (self.busy_until_s + latency_s + jitter_s).max(self.last_arrival_s);
+            // All that follows is held up as well.
             if self.happens(stall) {
-                jitter_s += STALL_S_MAX * self.part();
+                arrival_s += STALL_S_MAX * self.part();
             }
-            let arrival_s = (self.busy_until_s + latency_s + jitter_s).max(self.last_arrival_s);
             self.last_arrival_s = arrival_s;
             if self.happens(drop) {
                 continue;

@@ -15,6 +15,8 @@ mod window;
 #[cfg(test)]
 mod check_tests;
 #[cfg(test)]
+mod late_tests;
+#[cfg(test)]
 mod lossy_line;
 #[cfg(test)]
 mod tests;
@@ -32,6 +34,7 @@ pub use self::{
 };
 use self::{
     lanes::{Draft, Gate, Lanes},
+    rtt::RTO_S_MIN,
     window::Window,
 };
 use crate::move_queue::MoveQueue;
@@ -115,6 +118,8 @@ struct Held {
 #[derive(Clone, Debug)]
 pub struct Link {
     deframer: Deframer,
+    /// When the first of the bytes came that may become a block.
+    pending_since_s: f64,
     window: Window,
     checks: Option<BlockChecks>,
     /// The board has sent a block with a valid check: from then on it sends none without.
@@ -145,6 +150,7 @@ impl Link {
     pub fn greeting(payload: &[u8]) -> Self {
         Self {
             deframer: Deframer::new(),
+            pending_since_s: 0.0,
             window: Window::new(payload.to_vec()),
             checks: None,
             is_checked: false,
@@ -183,9 +189,10 @@ impl Link {
 
     /// Takes bytes from the port and hands on the messages in them, block by block.
     pub fn receive(&mut self, bytes: &[u8], now: Seconds, mut each: impl FnMut(Payload<'_>)) {
-        let Self { deframer, window, checks, is_checked, stats, .. } = self;
+        let Self { deframer, window, checks, is_checked, stats, pending_since_s, .. } = self;
         stats.bytes_received += bytes.len() as u64;
-        deframer.push(bytes, |frame| {
+        let pending_s_max = window.round_trip.answer_s_max().max(RTO_S_MIN);
+        let mut take = |frame: Frame<'_>| {
             let Frame::Block { sequence, mut payload } = frame else {
                 stats.garbage += 1;
                 return;
@@ -212,7 +219,15 @@ impl Link {
             if !payload.is_empty() {
                 each(Payload { bytes: payload, received: now, sent: verdict.sent_s.map(Seconds) });
             }
-        });
+        };
+        if now.0 - *pending_since_s > pending_s_max {
+            deframer.give_up(&mut take);
+            *pending_since_s = now.0;
+        }
+        deframer.push(bytes, take);
+        if deframer.pending() <= bytes.len() {
+            *pending_since_s = now.0;
+        }
     }
 
     /// Puts a message into its lane.

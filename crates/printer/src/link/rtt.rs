@@ -79,14 +79,9 @@ impl RoundTrip {
 
     /// No answer comes sooner than this after what caused it, in seconds.
     pub(super) fn answer_s_min(&self) -> f64 {
-        const ALLOWANCE: f64 = 0.9;
+        // The shortest of late was that of a full block behind others; the next may be short and have the line to itself.
+        const ALLOWANCE: f64 = 0.6;
         ALLOWANCE * self.floor
-    }
-
-    /// Hardly an answer comes sooner than this after what caused it, in seconds.
-    pub(super) fn usual_answer_s_min(&self) -> f64 {
-        const ALLOWANCE: f64 = 0.8;
-        ALLOWANCE * self.smoothed.unwrap_or(0.0)
     }
 
     /// No answer comes later than this after what caused it, in seconds.
@@ -138,9 +133,9 @@ impl Loss {
         }
     }
 
-    /// The most blocks to have on the way: about three times those that arrive before one is lost.
+    /// The most blocks to have on the way: about half as many again as arrive before one is lost.
     pub(super) fn window_blocks(&self) -> usize {
-        const LOSSES_IN_WINDOW: f64 = 3.0;
+        const LOSSES_IN_WINDOW: f64 = 1.5;
         const LOWEST: f64 = 2.0;
         let blocks = LOSSES_IN_WINDOW / self.share.max(f64::MIN_POSITIVE);
         blocks.clamp(LOWEST, WINDOW_BLOCKS_MAX as f64) as usize
@@ -222,7 +217,7 @@ mod tests {
         for _ in 0..100 {
             loss.lost();
         }
-        assert_eq!((loss.window_blocks(), loss.payload_bytes()), (3, 12));
+        assert_eq!((loss.window_blocks(), loss.payload_bytes()), (2, 12));
         loss.arrived(300);
         assert_eq!((loss.window_blocks(), loss.payload_bytes()), (WINDOW_BLOCKS_MAX, PAYLOAD_BYTES_MAX));
     }

@@ -2,20 +2,24 @@
 //!
 //! The board takes blocks in order only. Every block it sends carries the sequence number it expects next; an empty
 //! one is an acknowledgement, and one that repeats the last number says that something else arrived than what was
-//! expected. So a loss is repaired by sending again everything that is unacknowledged.
+//! expected. Such a refusal is repaired by sending again everything that is unacknowledged.
 //!
 //! Every transmission gets one answer, in order. Those that were on the way behind a lost block all repeat its
 //! number, and so do the answers to what was sent again in vain: taken for new losses, each would cause more of the
-//! same. So transmissions and answers are counted against each other, and a repeated number is a loss only when it
+//! same. So transmissions and answers are counted against each other, and a repeated number is a refusal only when it
 //! answers the last transmission of the block in question, or a later one.
+//!
+//! Silence is no refusal: answers may be lost, or the line may only hold bytes up. Then the first unacknowledged block
+//! alone is sent again, which has the board say what it expects, and at worst is one answer too many. Late answers
+//! keep their places in the count: none is given up.
 //!
 //! Knows nothing of what is in the blocks but the motion clocks that it is given.
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, ops::Range};
 
 use units::Ticks;
 use wire::{
-    block::{BLOCK_BYTES_MIN, Block, PAYLOAD_BYTES_MAX, SEQUENCE_MASK, SYNC},
+    block::{BLOCK_BYTES_MAX, BLOCK_BYTES_MIN, Block, PAYLOAD_BYTES_MAX, SEQUENCE_MASK, SYNC},
     check::BlockCheck,
 };
 
@@ -29,6 +33,9 @@ const TRANSMISSIONS_REMEMBERED: usize = 64;
 
 /// The board sends four bits of a sequence number that the host counts in full.
 const SEQUENCES: u64 = SEQUENCE_MASK as u64 + 1;
+
+/// What is sent as noise has no number; those of blocks are greater.
+const NOISE: u64 = 0;
 
 /// The motion in a block.
 #[derive(Clone, Copy, Debug)]
@@ -55,13 +62,21 @@ struct Sent {
     motion: MotionClocks,
 }
 
-/// The latest transmission of a sequence number.
+/// The latest transmission of a sequence number, but for those that only asked.
 #[derive(Clone, Copy, Debug, Default)]
 struct Transmission {
-    /// When, where there was only one.
-    sent_s: Option<f64>,
+    at_s: f64,
+    /// It was the only one.
+    only: bool,
     /// Its place among all transmissions.
     place: u64,
+}
+
+/// A transmission.
+#[derive(Clone, Copy, Debug, Default)]
+struct Logged {
+    sequence: u64,
+    at_s: f64,
 }
 
 /// Something was sent again.
@@ -101,14 +116,13 @@ pub(super) struct Window {
     /// The number in the last empty block, and when that came.
     last_answer: u64,
     last_answer_s: f64,
-    /// Blocks below this number have been sent again; the board may have had some of them already.
-    resent_below: u64,
     /// Transmissions so far.
     transmissions: u64,
-    /// The place of the transmission that the next answer belongs to.
+    /// The next answer belongs to the transmission at this place or, where answers were lost, to a later one.
     unanswered: u64,
-    /// So many answers were given up and may come after all.
-    late_answers: u64,
+    /// The place of the last transmission that only asked, and when that was.
+    asked: u64,
+    asked_s: f64,
     /// The board asked for the front again.
     send_again: bool,
     /// The board asked for the front, but perhaps before it was sent for the last time.
@@ -116,8 +130,8 @@ pub(super) struct Window {
     last_progress_s: f64,
     /// By sequence number modulo 16.
     latest: [Transmission; SEQUENCES as usize],
-    /// The sequence numbers of the last transmissions, by place.
-    log: [u64; TRANSMISSIONS_REMEMBERED],
+    /// The last transmissions, by place.
+    log: [Logged; TRANSMISSIONS_REMEMBERED],
     motion_ends: [Ticks; MOTION_LANES_MAX],
     pub(super) round_trip: RoundTrip,
     pub(super) loss: Loss,
@@ -139,15 +153,15 @@ impl Window {
             sent_bytes: 0,
             last_answer: 0,
             last_answer_s: 0.0,
-            resent_below: 0,
             transmissions: 0,
             unanswered: 0,
-            late_answers: 0,
+            asked: 0,
+            asked_s: f64::NEG_INFINITY,
             send_again: false,
             suspect: false,
             last_progress_s: 0.0,
             latest: [Transmission::default(); SEQUENCES as usize],
-            log: [0; TRANSMISSIONS_REMEMBERED],
+            log: [Logged::default(); TRANSMISSIONS_REMEMBERED],
             motion_ends: [Ticks(0); MOTION_LANES_MAX],
             round_trip: RoundTrip::new(),
             loss: Loss::new(),
@@ -241,7 +255,6 @@ impl Window {
         // Numbers start a whole turn above zero, so that there is always one before.
         self.expected = SEQUENCES + u64::from(sequence);
         self.last_answer = self.expected;
-        self.resent_below = self.expected;
     }
 
     /// Frames and sends a payload. Returns its length.
@@ -259,7 +272,7 @@ impl Window {
         };
         let len = block.as_bytes().len();
         out.extend_from_slice(block.as_bytes());
-        self.transmitted(sequence, Some(now_s));
+        self.transmitted(sequence, true, now_s);
         if self.sent.is_empty() {
             self.last_progress_s = now_s;
         }
@@ -268,54 +281,74 @@ impl Window {
         len
     }
 
-    /// When everything unacknowledged has to be sent again.
+    /// When something unacknowledged has to be sent again.
     pub(super) fn resend_due_s(&self) -> Option<f64> {
         let front = self.sent.front()?;
         if self.send_again {
             return Some(f64::NEG_INFINITY);
         }
         let timeout_s = front.last_s.max(self.last_progress_s) + self.round_trip.timeout_s();
-        let silence_s = self.last_answer_s + 0.5 * self.round_trip.answer_s_max();
-        let suspicion_s = silence_s.max(front.last_s + self.round_trip.answer_s_max());
+        // To ask costs little, so it is not waited for the very last that could still come.
+        let answer_s = 0.6 * self.round_trip.answer_s_max();
+        let suspicion_s = (self.last_answer_s + 0.5 * answer_s).max(front.last_s + answer_s);
         Some(if self.suspect { timeout_s.min(suspicion_s) } else { timeout_s })
     }
 
-    /// Sends everything unacknowledged again where that is due.
+    /// Sends again what is due: after a refusal everything unacknowledged, after silence the first of it.
     pub(super) fn resend(&mut self, now_s: f64, out: &mut Vec<u8>) -> Option<Resent> {
         if self.resend_due_s().is_none_or(|due| now_s < due) {
             return None;
         }
-        let timed_out = !self.send_again && !self.suspect;
+        let refused = self.send_again;
+        let timed_out = !refused && !self.suspect;
         if timed_out {
             self.round_trip.timed_out();
-        }
-        if !self.send_again {
-            // Whatever has not been answered by now will not be, or late: the line may only hold bytes up. Such an answer
-            // looks as if what is sent now had been lost; taken so, it fills the line with repetitions, and what is
-            // answered then comes later still.
-            self.late_answers = self.transmissions - self.unanswered;
-            self.unanswered = self.transmissions;
         }
         self.loss.lost();
         self.send_again = false;
         self.suspect = false;
         let before = out.len();
+        let blocks = if refused { self.sent.len() } else { 1 };
+        let is_silent = timed_out && self.asked > self.latest(self.expected).place;
+        if is_silent {
+            // A board that takes noise for the beginning of a block is silent until so many bytes have come; these are none
+            // that a block ends with.
+            out.resize(before + BLOCK_BYTES_MAX, 0);
+            self.log(NOISE, now_s);
+        }
         out.push(SYNC);
-        for at in 0..self.sent.len() {
+        for at in 0..blocks {
             let sent = &mut self.sent[at];
             out.extend_from_slice(sent.block.as_bytes());
             sent.last_s = now_s;
             sent.transmissions = sent.transmissions.saturating_add(1);
-            self.transmitted(self.expected + at as u64, None);
+            let sequence = self.expected + at as u64;
+            if refused {
+                self.transmitted(sequence, false, now_s);
+            } else {
+                self.asked(sequence, now_s);
+            }
         }
-        self.resent_below = self.expected + self.sent.len() as u64;
         Some(Resent { bytes: out.len() - before, timed_out })
     }
 
-    fn transmitted(&mut self, sequence: u64, sent_s: Option<f64>) {
-        self.latest[(sequence % SEQUENCES) as usize] = Transmission { sent_s, place: self.transmissions };
-        self.log[self.transmissions as usize % TRANSMISSIONS_REMEMBERED] = sequence;
+    fn transmitted(&mut self, sequence: u64, only: bool, at_s: f64) {
+        let place = self.log(sequence, at_s);
+        self.latest[(sequence % SEQUENCES) as usize] = Transmission { at_s, only, place };
+    }
+
+    /// A refusal of what was sent before still is one: everything behind it is lost as well.
+    fn asked(&mut self, sequence: u64, at_s: f64) {
+        self.latest[(sequence % SEQUENCES) as usize].only = false;
+        (self.asked, self.asked_s) = (self.log(sequence, at_s), at_s);
+    }
+
+    /// Something was sent that gets an answer. Gives its place.
+    fn log(&mut self, sequence: u64, at_s: f64) -> u64 {
+        let place = self.transmissions;
+        self.log[place as usize % TRANSMISSIONS_REMEMBERED] = Logged { sequence, at_s };
         self.transmissions += 1;
+        place
     }
 
     fn latest(&self, sequence: u64) -> Transmission {
@@ -341,10 +374,12 @@ impl Window {
         if empty {
             self.judge(number, now_s);
         }
-        Verdict { sent_s: self.latest(number - 1).sent_s, absurd: false }
+        let cause = self.latest(number - 1);
+        Verdict { sent_s: cause.only.then_some(cause.at_s), absurd: false }
     }
 
     fn acknowledge(&mut self, count: usize, now_s: f64) {
+        let latest = self.latest(self.expected + count as u64 - 1);
         for (at, sent) in self.sent.drain(..count).enumerate() {
             self.sent_bytes -= sent.block.as_bytes().len();
             for (end, lane) in self.motion_ends.iter_mut().zip(sent.motion.ends) {
@@ -354,10 +389,11 @@ impl Window {
             if at + 1 < count {
                 continue;
             }
-            if sent.transmissions == 1 {
+            // An answer that skips some may be the one to a question that was asked behind the block.
+            if sent.transmissions == 1 && (count == 1 || latest.place > self.asked) {
                 self.round_trip.sample(now_s - sent.first_s);
             } else {
-                self.round_trip.bound(now_s - sent.last_s);
+                self.round_trip.bound(now_s - sent.last_s.max(self.asked_s));
             }
         }
         self.expected += count as u64;
@@ -370,38 +406,52 @@ impl Window {
     /// Tells a refusal from an acknowledgement.
     fn judge(&mut self, number: u64, now_s: f64) {
         self.last_answer_s = now_s;
+        let front = self.latest(self.expected);
+        let answerable = self.answerable(now_s);
         if number > self.last_answer {
-            // A board that already had some of what was sent again answers the first of it with a number far ahead,
-            // and so does one whose answers were lost on the way; the former leaves more answers to come.
-            let answered = if number <= self.resent_below { self.last_answer } else { number - 1 };
-            self.unanswered = self.place_of(answered) + 1;
             self.last_answer = number;
+            self.unanswered = self.place_of(number - 1, answerable) + 1;
+            // Where this answers a question, all that was sent before and is still on the way was refused.
+            self.suspect |= !self.sent.is_empty() && front.place < self.asked;
             return;
         }
-        let Some(front) = self.sent.front() else { return };
         let place = self.unanswered;
-        self.unanswered = (place + 1).min(self.transmissions);
-        let age_s = now_s - front.last_s;
-        let is_late = self.late_answers > 0 && age_s < self.round_trip.usual_answer_s_min();
-        self.late_answers = if is_late { self.late_answers - 1 } else { 0 };
-        let answers_front =
-            place >= self.latest(self.expected).place && age_s >= self.round_trip.answer_s_min() && !is_late;
-        if answers_front {
+        let is_counted = place < answerable;
+        self.unanswered += u64::from(is_counted);
+        if self.sent.is_empty() {
+            return;
+        }
+        if is_counted && place >= front.place {
             self.send_again = true;
         } else {
             self.suspect = true;
         }
     }
 
-    /// The place of the transmission of a block that an answer to it most likely belongs to: the one that is nearest
-    /// to where the count of answers stands. Noise makes the board answer too often, and answers get lost; this
-    /// brings the count back into step.
-    fn place_of(&self, sequence: u64) -> u64 {
-        let remembered =
-            self.transmissions.saturating_sub(TRANSMISSIONS_REMEMBERED as u64)..self.transmissions;
-        remembered
-            .filter(|&place| self.log[place as usize % TRANSMISSIONS_REMEMBERED] == sequence)
-            .min_by_key(|&place| place.abs_diff(self.unanswered))
+    fn logged(&self, place: u64) -> Logged {
+        self.log[place as usize % TRANSMISSIONS_REMEMBERED]
+    }
+
+    /// The place of the first transmission that was too short a time ago to have been answered.
+    fn answerable(&self, now_s: f64) -> u64 {
+        let until_s = now_s - self.round_trip.answer_s_min();
+        let young = self.remembered().rev().take_while(|&place| self.logged(place).at_s > until_s).count();
+        self.transmissions - young as u64
+    }
+
+    fn remembered(&self) -> Range<u64> {
+        self.transmissions.saturating_sub(TRANSMISSIONS_REMEMBERED as u64)..self.transmissions
+    }
+
+    /// The place of the transmission by which the board got a block that it has acknowledged: the first that has not been
+    /// answered and can have been by now. Noise makes the board answer too often: then it is in the past, and brings the
+    /// count back into step.
+    fn place_of(&self, sequence: u64, answerable: u64) -> u64 {
+        let is_it = |place: &u64| self.logged(*place).sequence == sequence;
+        let remembered = self.remembered();
+        (self.unanswered.max(remembered.start)..answerable)
+            .find(is_it)
+            .or_else(|| (remembered.start..self.unanswered).rev().find(is_it))
             .unwrap_or_else(|| self.latest(sequence).place)
     }
 }
