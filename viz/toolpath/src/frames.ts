@@ -99,6 +99,8 @@ export class FrameLoop {
   /** A picture of what has come is drawn then at the earliest; and how long after that one the next. */
   #nextGrowth: Ms = -Infinity;
   #growthMs: Ms = GROWTH_MS;
+  /** The first of the file came then. */
+  #cameAt: Ms = Infinity;
   /** What the last quick or full picture took. */
   #tookMs: Ms = 0;
   /** Runs while changes are gathered. */
@@ -121,12 +123,14 @@ export class FrameLoop {
     this.#growsUntil = -Infinity;
     this.#nextGrowth = -Infinity;
     this.#growthMs = GROWTH_MS;
+    this.#cameAt = Infinity;
   }
 
   /** The file has grown, and will again: a picture now and then, and no full one is begun between. */
   grew(): void {
     const now = this.#clock.now();
     this.#growsUntil = now + GROWTH_REST_MS;
+    this.#cameAt = Math.min(this.#cameAt, now);
     // How long a picture takes, and with it the pause, is known when it is done.
     if (now < this.#nextGrowth || this.#frame !== null || this.#poll !== null) return;
     this.#nextGrowth = now + this.#growthMs;
@@ -174,9 +178,10 @@ export class FrameLoop {
     }, delayMs);
   }
 
-  /** A picture has taken so long. */
-  #took(elapsed: Ms): void {
+  /** A picture has taken so long. One that shows nothing of the file yet does not delay the first that does. */
+  #took(began: Ms, elapsed: Ms): void {
     this.#tookMs = elapsed;
+    if (began < this.#cameAt) return;
     const pause = Math.min(elapsed * GROWTH_PAUSE, GROWTH_PAUSE_MAX_MS);
     this.#nextGrowth = Math.max(this.#nextGrowth, this.#clock.now() + pause);
   }
@@ -248,7 +253,7 @@ export class FrameLoop {
       const segments = this.#painter.drawQuick(this.#quickBudget.segments);
       this.#await(began, (elapsed) => {
         this.#quickBudget.measured(segments, elapsed);
-        this.#took(elapsed);
+        this.#took(began, elapsed);
         this.#tell({ kind: 'quick', segments, longestMs: elapsed, totalMs: elapsed });
       });
     } else if (this.#fullWanted) {
@@ -290,7 +295,7 @@ export class FrameLoop {
       this.#longest = Math.max(this.#longest, elapsed);
       if (!complete) return this.#tellPart();
       const totalMs = this.#clock.now() - this.#pictureBegan;
-      this.#took(totalMs);
+      this.#took(this.#pictureBegan, totalMs);
       this.#tell({ kind: 'full', segments: this.#pictureSegments, longestMs: this.#longest, totalMs });
     });
   }

@@ -256,6 +256,19 @@ describe('a file that comes', () => {
     expect(made.reports.length).toBe(before + 1);
   });
 
+  test('a picture from before does not delay the first one', () => {
+    const made = setUp(1_000_000, 0.02);
+    made.loop.moved();
+    made.clock.run(20);
+    // That one is still being drawn.
+    expect(made.reports).toHaveLength(0);
+    made.loop.begins();
+    grow(made, 1_000);
+    const { reports } = made;
+    expect(reports.length).toBeGreaterThanOrEqual(2);
+    expect(reports[0]?.totalMs).toBeGreaterThan(100);
+  });
+
   test('who moves the view meanwhile gets no full picture before it is whole', () => {
     const made = setUp(1_000_000, 0.001);
     made.loop.begins();
