@@ -119,7 +119,7 @@ export function Viewer(): JSX.Element {
         <progress class="reading" aria-label="Reading the file" max={1} value={progress} />
       )}
       {outline.value && hasView && (
-        <Later pictures={2}>
+        <Later pictures={3}>
           <MoveBar />
         </Later>
       )}

@@ -42,7 +42,7 @@ export const thumbnails = signal<readonly Thumbnail[]>([]);
 export const confirmed = signal<ReadonlySet<number>>(new Set());
 
 /** What belongs to an outline is on the page after so many pictures. */
-const OUTLINE_PICTURES = 3;
+const OUTLINE_PICTURES = 5;
 
 /** A worker that stops this often without having read anything in between is not started again. */
 const DEATHS_MAX = 3;
