@@ -1,9 +1,10 @@
 // How far a print is, and what the tab says of it.
 import { expect, test } from 'vitest';
-import type { Layer, Summary } from '../src/preview/protocol';
+import type { Layer } from '../src/preview/protocol';
 import { LineMarks } from '../src/state/marks';
 import { layerOf, progressOf, titleOf } from '../src/state/print';
 import { mm, seconds, share } from '../src/units';
+import { summaryOf } from './fake_summary';
 
 const layers: Layer[] = [0, 100, 250].map((first, at) => ({
   first,
@@ -11,25 +12,14 @@ const layers: Layer[] = [0, 100, 250].map((first, at) => ({
   line: first + 10,
   time: seconds(10),
 }));
-const plan: Summary = {
-  errors: [],
-  blocking: [],
-  remarks: [],
-  dropped: 0,
+const plan = summaryOf({
   lines: 400,
   moves: 300,
   filament: mm(900),
-  bounds: null,
   vertices: 400,
   layers,
   time: seconds(200),
-  features: [],
-  objects: [],
-  tools: [],
-  leftOut: 0,
-  clamped: 0,
-  generator: null,
-};
+});
 const file = { name: 'part.gcode', blob: new Blob() };
 
 function marksOf(...pairs: readonly (readonly [number, number])[]): LineMarks {
